@@ -1,0 +1,50 @@
+"""mcmj: morphological computation in MuJoCo.
+
+A compliant body (a random planar network of masses and nonlinear springs) computes; only a
+linear, static readout of its spring lengths is trained (Hauser et al., Biol. Cybern. 2012).
+"""
+
+import ctypes.util
+import os
+import sys
+
+
+def _choose_gl() -> None:
+    """Without a display MuJoCo must be told, before its import, how to draw off-screen."""
+    if sys.platform != "linux" or "MUJOCO_GL" in os.environ or os.environ.get("DISPLAY"):
+        return
+    for backend, library in (("egl", "EGL"), ("osmesa", "OSMesa")):
+        if ctypes.util.find_library(library):
+            os.environ["MUJOCO_GL"] = backend
+            return
+
+
+_choose_gl()
+
+from mcmj.body import Body  # noqa: E402  (mujoco reads MUJOCO_GL at import)
+from mcmj.bodyfile import from_mjcf  # noqa: E402
+from mcmj.ensemble import Ensemble  # noqa: E402
+from mcmj.errors import McmjError  # noqa: E402
+from mcmj.generator import random_body  # noqa: E402
+from mcmj.mjcf import to_mjcf  # noqa: E402
+from mcmj.readout import fit_readout  # noqa: E402
+from mcmj.simulation import Simulation  # noqa: E402
+from mcmj.spring_laws import SpringLaw  # noqa: E402
+from mcmj.targets import Target, target  # noqa: E402
+from mcmj.teaching import Teaching, teach  # noqa: E402
+
+__all__ = [
+    "Body",
+    "Ensemble",
+    "McmjError",
+    "Simulation",
+    "SpringLaw",
+    "Target",
+    "Teaching",
+    "fit_readout",
+    "from_mjcf",
+    "random_body",
+    "target",
+    "teach",
+    "to_mjcf",
+]

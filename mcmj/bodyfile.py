@@ -1,0 +1,172 @@
+"""MJCF -> Body: read back what `mcmj.mjcf` wrote, to the bit, from a file or a compiled model."""
+
+import json
+from pathlib import Path
+
+import mujoco
+import numpy as np
+
+from mcmj.body import Body
+from mcmj.errors import BodyFileError, InvalidArgumentError
+from mcmj.laws import TAG
+from mcmj.mjcf import READOUT_PREFIX
+from mcmj.validation import Array
+
+
+def from_mjcf(xml_or_path: str | Path) -> tuple[Body, Array | None]:
+    """Read back a body, and its readout if it has one, from MJCF text or a file.
+
+    Raises:
+        BodyFileError: no such file, not MJCF, or not an mcmj body.
+    """
+    model = load_model(xml_or_path)
+    return body_of_model(model), readout_of_model(model)
+
+
+def load_model(xml_or_path: str | Path) -> mujoco.MjModel:
+    """Compile MJCF text (anything that starts with "<") or a file.
+
+    Raises:
+        BodyFileError: no such file, or MuJoCo cannot compile it.
+    """
+    text = str(xml_or_path)
+    inline = text.lstrip().startswith("<")
+    if not inline and not Path(text).is_file():
+        raise BodyFileError(f"no such body file: {text}")
+    try:
+        if inline:
+            return mujoco.MjModel.from_xml_string(text)
+        return mujoco.MjModel.from_xml_path(text)
+    except ValueError as error:
+        source = "MJCF text" if inline else text
+        raise BodyFileError(f"{source}: MuJoCo cannot compile it: {error}") from error
+
+
+def body_of_model(model: mujoco.MjModel) -> Body:
+    """The Body inside a compiled model.
+
+    Raises:
+        BodyFileError: the model is not an mcmj body.
+    """
+    nodes = _ids(model, mujoco.mjtObj.mjOBJ_SITE, "n", model.nsite)
+    springs = _ids(model, mujoco.mjtObj.mjOBJ_TENDON, "s", model.ntendon)
+    if len(nodes) < 2 or len(springs) == 0:
+        raise BodyFileError(
+            "not an mcmj body: expected sites n0, n1, .. and spatial tendons s0, s1, .., got "
+            f"{len(nodes)} such sites and {len(springs)} such tendons"
+        )
+    owner = model.site_bodyid[nodes]
+    fixed = owner == 0
+    positions = model.body_pos[owner] + model.site_pos[nodes]
+    masses = np.where(fixed, 1.0, model.body_mass[owner])
+    if (stored := _numeric(model, "fixed_masses")) is not None:
+        masses[fixed] = stored
+    try:
+        return Body(
+            positions=positions[:, :2],
+            springs=_spring_ends(model, springs, nodes),
+            fixed=fixed,
+            masses=masses,
+            w_in=_weights(model, "in", fixed),
+            w_fb=_weights(model, "fb", fixed),
+            **_spring_parameters(model, springs),
+        )
+    except InvalidArgumentError as error:
+        raise BodyFileError(f"not a valid mcmj body: {error}") from error
+
+
+def readout_of_model(model: mujoco.MjModel) -> Array | None:
+    """The readout (L or L + 1, n_outputs) stored in the model's actuators, None without one."""
+    channels = _ids(model, mujoco.mjtObj.mjOBJ_ACTUATOR, "fb", model.nu)
+    if len(channels) == 0 or model.nuser_actuator == 0:
+        return None
+    return np.ascontiguousarray(model.actuator_user[channels].T)
+
+
+def readouts_of_model(model: mujoco.MjModel) -> dict[str, Array]:
+    """The named readouts that `to_mjcf` stored, (L or L + 1, n_outputs) each."""
+    n_outputs = len(_ids(model, mujoco.mjtObj.mjOBJ_ACTUATOR, "fb", model.nu))
+    names = [model.numeric(i).name for i in range(model.nnumeric)]
+    return {
+        name.removeprefix(READOUT_PREFIX): model.numeric(name).data.reshape(-1, n_outputs).copy()
+        for name in names
+        if name.startswith(READOUT_PREFIX)
+    }
+
+
+def provenance_of_model(model: mujoco.MjModel) -> dict[str, object] | None:
+    """The account that `to_mjcf` stored of where the body comes from."""
+    text = _text(model, "provenance")
+    return None if text is None else json.loads(text)
+
+
+def spring_law_of_model(model: mujoco.MjModel) -> str:
+    """Name of the spring law that the model was written with."""
+    return _text(model, "spring_law") or "native"
+
+
+def _ids(model: mujoco.MjModel, kind: mujoco.mjtObj, prefix: str, total: int) -> np.ndarray:
+    """Ids of <prefix>0, <prefix>1, .. up to the first that is missing."""
+    found: list[int] = []
+    while len(found) < total:
+        index = mujoco.mj_name2id(model, kind, f"{prefix}{len(found)}")
+        if index < 0:
+            break
+        found.append(index)
+    return np.array(found, dtype=np.int64)
+
+
+def _spring_ends(model: mujoco.MjModel, springs: np.ndarray, nodes: np.ndarray) -> np.ndarray:
+    node_of_site = {site: node for node, site in enumerate(nodes.tolist())}
+    ends = []
+    for tendon in springs:
+        start = model.tendon_adr[tendon]
+        sites = model.wrap_objid[start : start + model.tendon_num[tendon]].tolist()
+        if len(sites) != 2 or not all(site in node_of_site for site in sites):
+            raise BodyFileError(f"tendon {model.tendon(tendon).name} does not join two nodes")
+        ends.append([node_of_site[site] for site in sites])
+    return np.array(ends)
+
+
+def _spring_parameters(model: mujoco.MjModel, springs: np.ndarray) -> dict[str, Array]:
+    if model.nuser_tendon and (model.tendon_user[springs, 0] == TAG).all():
+        columns = model.tendon_user[springs, 2:7].T
+        return dict(zip(("rest_lengths", "k1", "k3", "d1", "d3"), columns, strict=True))
+    if model.tendon_stiffnesspoly[springs, 0].any() or model.tendon_dampingpoly[springs, 0].any():
+        raise BodyFileError("a spring with a quadratic term is not an mcmj spring")
+    return {
+        "rest_lengths": model.tendon_lengthspring[springs, 0],
+        "k1": model.tendon_stiffness[springs],
+        "k3": model.tendon_stiffnesspoly[springs, 1],
+        "d1": model.tendon_damping[springs],
+        "d3": model.tendon_dampingpoly[springs, 1],
+    }
+
+
+def _weights(model: mujoco.MjModel, prefix: str, fixed: np.ndarray) -> Array:
+    """Weights (N, channels) from the joint coefficients of the channels' fixed tendons."""
+    channels = _ids(model, mujoco.mjtObj.mjOBJ_TENDON, prefix, model.ntendon)
+    weights = np.zeros((len(fixed), len(channels)))
+    for c, tendon in enumerate(channels):
+        for wrap in range(
+            model.tendon_adr[tendon], model.tendon_adr[tendon] + model.tendon_num[tendon]
+        ):
+            joint = model.joint(model.wrap_objid[wrap]).name
+            weights[int(joint[1:-1]), c] = model.wrap_prm[wrap]
+    stored = _numeric(model, f"fixed_w_{prefix}")
+    if stored is not None:
+        weights[fixed] = stored.reshape(-1, len(channels))
+    return weights
+
+
+def _numeric(model: mujoco.MjModel, name: str) -> Array | None:
+    index = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_NUMERIC, name)
+    return None if index < 0 else model.numeric(index).data.copy()
+
+
+def _text(model: mujoco.MjModel, name: str) -> str | None:
+    index = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_TEXT, name)
+    if index < 0:
+        return None
+    start = model.text_adr[index]
+    return model.text_data[start : start + model.text_size[index] - 1].decode()

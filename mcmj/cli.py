@@ -1,0 +1,52 @@
+"""What every script does around its experiment: arguments, folder, errors, exit status."""
+
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, TypeVar
+
+import tyro
+
+from mcmj.errors import McmjError
+from mcmj.store import prepare_folder
+
+C = TypeVar("C")
+
+
+@dataclass(frozen=True)
+class Output:
+    """Where results go.
+
+    Attributes:
+        out: folder for metrics.json and the figures; default: results/<script>.
+        quiet: no progress bars and no table.
+        video: make videos.
+    """
+
+    out: Path | None = None
+    quiet: bool = False
+    video: bool = True
+
+
+def main(name: str, config_type: type[C], work: Callable[[C, Output, Path], None]) -> None:
+    """Parse the command line into a config, run `work`, and turn errors into exit status 1.
+
+    Args:
+        name: the script's name.
+        work: called with config, output options and the (existing, writable) folder.
+    """
+
+    def command(
+        config: Annotated[config_type, tyro.conf.OmitArgPrefixes],  # type: ignore[valid-type]
+        output: Annotated[Output, tyro.conf.OmitArgPrefixes],
+    ) -> None:
+        work(config, output, prepare_folder(output.out or Path("results") / name))
+
+    try:
+        tyro.cli(command, prog=f"{name}.py")
+    except McmjError as error:
+        sys.exit(f"{name}: error: {error}")
+    except KeyboardInterrupt:
+        print(f"{name}: interrupted; nothing half-written is left", file=sys.stderr)
+        sys.exit(130)

@@ -1,0 +1,45 @@
+"""Errors of mcmj: one base class, messages that say what was expected and what came."""
+
+from collections.abc import Iterable
+
+
+class McmjError(Exception):
+    """Base class of every error that mcmj raises on purpose."""
+
+
+class InvalidArgumentError(McmjError, ValueError):
+    """An argument with a wrong value: names it, what was expected and what came."""
+
+    def __init__(self, name: str, expected: str, got: object) -> None:
+        self.name = name
+        super().__init__(f"{name}: expected {expected}, got {got}")
+
+
+class UnknownNameError(McmjError, ValueError):
+    """A name that is not one of the valid choices, which the message lists."""
+
+    def __init__(self, kind: str, got: object, choices: Iterable[str]) -> None:
+        self.choices = sorted(choices)
+        super().__init__(f"unknown {kind} {got!r}; valid choices: {', '.join(self.choices)}")
+
+
+class BodyFileError(McmjError, ValueError):
+    """A file or string that is not an mcmj body in MJCF."""
+
+
+class DivergenceError(McmjError, ArithmeticError):
+    """A simulation blew up: says when, where, under which integrator, and what to try.
+
+    Attributes:
+        time: simulation time of the last good step [s].
+        steps_done: number of good steps of this rollout.
+    """
+
+    def __init__(self, message: str, time: float, steps_done: int) -> None:
+        self.time = time
+        self.steps_done = steps_done
+        super().__init__(message)
+
+
+class OutputError(McmjError, OSError):
+    """A folder or file that cannot be written."""

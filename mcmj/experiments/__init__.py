@@ -1,0 +1,1 @@
+"""One experiment a module: a frozen Config, and run(config) -> Result."""

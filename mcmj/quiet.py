@@ -1,0 +1,35 @@
+"""Keep MuJoCo from printing warnings and writing MUJOCO_LOG.TXT: we report them ourselves."""
+
+import ctypes
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+import mujoco
+
+_lock = threading.Lock()
+_depth = 0
+_before: object = None
+
+
+@ctypes.CFUNCTYPE(None, ctypes.c_char_p)
+def _ignore(message: bytes) -> None:
+    """Warning counters in mjData say the same, per simulation."""
+
+
+@contextmanager
+def quiet_warnings() -> Iterator[None]:
+    """Silence MuJoCo's warning handler inside the block; nests, also across threads."""
+    global _depth, _before
+    with _lock:
+        if _depth == 0:
+            _before = mujoco.get_mju_user_warning()
+            mujoco.set_mju_user_warning(_ignore)
+        _depth += 1
+    try:
+        yield
+    finally:
+        with _lock:
+            _depth -= 1
+            if _depth == 0:
+                mujoco.set_mju_user_warning(_before)

@@ -1,0 +1,138 @@
+"""Linear static readouts: least squares and ridge regression, without normal equations."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import svd
+
+from mcmj.errors import InvalidArgumentError
+from mcmj.validation import Array, as_array, require_number
+
+
+@dataclass(frozen=True)
+class Fit:
+    """A fitted readout and how well posed it was.
+
+    Attributes:
+        w_out: (L, n_outputs), or (L + 1, n_outputs) with the bias in the last row.
+        train_nrmse: root mean square error on the rows fitted, over the targets' standard
+            deviation, all outputs together.
+        rank: number of singular values of the data above the rounding error.
+        condition_number: largest over smallest singular value of the data.
+        rows: number of samples fitted.
+    """
+
+    w_out: Array
+    train_nrmse: float
+    rank: int
+    condition_number: float
+    rows: int
+
+
+class Regression:
+    """Least squares over any number of rows in the memory of one chunk.
+
+    Keeps only the triangular factor R of the QR decomposition of [lengths, (1,) targets] and
+    folds every new chunk into it: QR([R; chunk]). Nothing is squared, so a condition number
+    of 1e8 costs 8 digits and not 16. For S = [A, Y] with R = [[R_A, Q^T Y], [0, E]]:
+
+        minimise |A W - Y|^2 + ridge |W|^2
+
+    by the SVD of R_A; |E| is the part of Y that no W reaches. The bias is not penalised.
+
+    Args:
+        bias: fit a constant too.
+    """
+
+    def __init__(self, *, bias: bool = False) -> None:
+        self._bias = bias
+        self._factor: Array | None = None
+        self._n_lengths = 0
+        self._rows = 0
+        self._target_sum = np.zeros(0)
+        self._target_squares = np.zeros(0)
+
+    def add(self, lengths: Array, targets: Array) -> None:
+        """Fold in samples: lengths (M, L) and targets (M, n_outputs).
+
+        Raises:
+            InvalidArgumentError: wrong shapes, or NaN.
+        """
+        x = as_array("lengths", lengths, (None, None))
+        y = as_array("targets", targets, (len(x), None))
+        ones = np.ones((len(x), int(self._bias)))
+        block = np.hstack([ones, x, y])
+        if self._factor is None:
+            self._n_lengths = x.shape[1]
+            self._factor = np.zeros((0, block.shape[1]))
+            self._target_sum = np.zeros(y.shape[1])
+            self._target_squares = np.zeros(y.shape[1])
+        elif block.shape[1] != self._factor.shape[1] or x.shape[1] != self._n_lengths:
+            raise InvalidArgumentError("lengths", f"{self._n_lengths} columns", x.shape[1])
+        stacked = np.vstack([self._factor, block])
+        self._factor = np.asarray(np.linalg.qr(stacked, mode="r"))
+        self._rows += len(x)
+        self._target_sum += y.sum(axis=0)
+        self._target_squares += (y**2).sum(axis=0)
+
+    def solve(self, ridge: float = 0.0) -> Fit:
+        """The readout for a ridge parameter >= 0.
+
+        A ridge of rows * s^2 does what white noise of standard deviation s [m] on the lengths
+        would do.
+
+        Raises:
+            InvalidArgumentError: no samples, or a negative ridge.
+        """
+        require_number("ridge", ridge, 0.0)
+        if self._factor is None or self._rows == 0:
+            raise InvalidArgumentError("lengths", "at least one sample", 0)
+        n_unknowns = self._n_lengths + int(self._bias)
+        top, reached = self._factor[:, :n_unknowns], self._factor[:, n_unknowns:]
+        weights, values = self._minimise(top, reached, ridge)
+        residual = reached - top @ weights
+        variance = self._target_squares / self._rows - (self._target_sum / self._rows) ** 2
+        rank = int((values > values[0] * max(self._rows, n_unknowns) * np.finfo(float).eps).sum())
+        return Fit(
+            w_out=np.roll(weights, -1, axis=0) if self._bias else weights,
+            train_nrmse=float(np.sqrt((residual**2).sum() / self._rows / variance.sum())),
+            rank=rank,
+            condition_number=float(values[0] / values[-1]) if values[-1] > 0 else np.inf,
+            rows=self._rows,
+        )
+
+    def _minimise(self, top: Array, reached: Array, ridge: float) -> tuple[Array, Array]:
+        """Weights, and the singular values of the data."""
+        u, values, vt = svd(top, full_matrices=False)
+        cut = values[0] * max(self._rows, top.shape[1]) * np.finfo(float).eps
+        if ridge == 0.0:
+            inverse = np.where(values > cut, 1.0 / np.maximum(values, cut), 0.0)
+            return vt.T @ (inverse[:, None] * (u.T @ reached)), values
+        penalty = np.sqrt(ridge) * np.eye(top.shape[1])
+        if self._bias:
+            penalty[0, 0] = 0.0
+        stacked = np.vstack([top, penalty])
+        goal = np.vstack([reached, np.zeros((len(penalty), reached.shape[1]))])
+        u, damped, vt = svd(stacked, full_matrices=False)
+        return vt.T @ ((u.T @ goal) / damped[:, None]), values
+
+
+def fit_readout(lengths: Array, targets: Array, ridge: float = 0.0, *, bias: bool = False) -> Array:
+    """Readout W minimising |lengths W - targets|^2 + ridge |W|^2.
+
+    Without a bias, as the paper's readout (Hauser et al. 2012, Eq. 9); `ridge` is 0 unless
+    given: plain least squares.
+
+    Args:
+        lengths: (M, L).
+        targets: (M, n_outputs).
+
+    Returns:
+        (L, n_outputs), or (L + 1, n_outputs) with the bias in the last row.
+
+    Raises:
+        InvalidArgumentError: wrong shapes, NaN, a negative ridge.
+    """
+    regression = Regression(bias=bias)
+    regression.add(lengths, targets)
+    return regression.solve(ridge).w_out

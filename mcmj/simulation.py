@@ -1,0 +1,245 @@
+"""Rollouts of a body in MuJoCo; the loop runs wholly in C, no Python per step.
+
+Two conventions hold under every integrator:
+
+- lengths[k] are at t_k, before step k;
+- inputs, offset, forces and the fed-back outputs are held over the step, also inside the
+  stages of RK4.
+"""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+
+import mujoco
+import numpy as np
+
+from mcmj.body import Body
+from mcmj.drive import Drive, check_drive
+from mcmj.engine import Engine
+from mcmj.errors import UnknownNameError
+from mcmj.mjcf import DEFAULT_INTEGRATOR, checked_readout
+from mcmj.spring_laws import SpringLaw
+from mcmj.trajectory import RECORDABLE, State, Trajectory, join
+from mcmj.validation import Array, as_array, require_count
+
+CHUNK = 16384  # control steps at a time in C: 8 MB of lengths at 61 springs
+
+Hook = Callable[[float, Array], Array]
+
+
+class Simulation:
+    """A body in MuJoCo; its state carries over from one rollout to the next.
+
+    Args:
+        body: the body.
+        w_out: readout (L, n_outputs), or (L + 1, n_outputs) with a bias in the last row.
+        timestep: control step [s]: inputs, feedback and records go at this pace.
+        integrator: one of MuJoCo's: Euler, RK4, implicit, implicitfast, discrete.
+        springs: "native" (MuJoCo's polynomial), "cubic" or "tansig" (compiled callback), or
+            your own SpringLaw.
+        feedback_delay: number of control steps between a length and the force it feeds back;
+            the first that many outputs fed back are 0.
+        substeps: physics steps in a control step.
+
+    Raises:
+        InvalidArgumentError, UnknownNameError: an argument out of bounds.
+    """
+
+    _copies: int | None = None  # an ensemble's arrays have a leading axis
+
+    def __init__(
+        self,
+        body: Body,
+        *,
+        w_out: object = None,
+        timestep: float = 1e-3,
+        integrator: str = DEFAULT_INTEGRATOR,
+        springs: str | SpringLaw = "native",
+        feedback_delay: int = 0,
+        substeps: int = 1,
+    ) -> None:
+        self._engine = Engine(
+            body,
+            copies=1,
+            threads=1,
+            timestep=timestep,
+            integrator=integrator,
+            springs=springs,
+            feedback_delay=feedback_delay,
+            substeps=substeps,
+        )
+        self.set_readout(w_out)
+
+    @property
+    def body(self) -> Body:
+        """The body that is simulated."""
+        return self._engine.body
+
+    @property
+    def model(self) -> mujoco.MjModel:
+        """The compiled model; readouts and gates of a rollout are not written to it."""
+        return self._engine.model
+
+    @property
+    def timestep(self) -> float:
+        """Control step [s]."""
+        return self._engine.timestep
+
+    @property
+    def time(self) -> float:
+        """Simulation time [s]."""
+        return self._engine.steps_done * self._engine.timestep
+
+    @property
+    def w_out(self) -> Array | None:
+        """The readout in use."""
+        return self._w_out
+
+    def set_readout(self, w_out: object) -> None:
+        """Replace the readout, from the next step on; None takes it away.
+
+        Raises:
+            InvalidArgumentError: wrong shape, or NaN.
+        """
+        self._w_out = None if w_out is None else self._checked_readout(w_out)
+        self._engine.set_readout(self._w_out)
+
+    def reset(self) -> None:
+        """Back to the start: the body's positions, at rest, time 0."""
+        self._engine.reset()
+
+    @property
+    def state(self) -> State:
+        """Positions, velocities and time now."""
+        state = self._engine.state
+        return replace(
+            state,
+            positions=self._public(state.positions),
+            velocities=self._public(state.velocities),
+        )
+
+    def set_state(self, positions: object = None, velocities: object = None) -> None:
+        """Put the nodes at positions and velocities (N, 2) [m], [m/s]; fixed nodes stay.
+
+        Raises:
+            InvalidArgumentError: wrong shape, or NaN.
+        """
+        self._engine.set_state(positions, velocities)
+
+    def snapshot(self) -> Array:
+        """The full integration state; `restore` continues from it bit for bit."""
+        return self._engine.snapshot()
+
+    def restore(self, snapshot: Array) -> None:
+        """Continue from a `snapshot` of a simulation of the same body and settings.
+
+        Raises:
+            InvalidArgumentError: a snapshot of another size.
+        """
+        self._engine.restore(snapshot)
+
+    def rollout(
+        self,
+        steps: int | None = None,
+        inputs: object = None,
+        offset: object = None,
+        gate: object = None,
+        forces: object = None,
+        *,
+        record: Sequence[str] = ("lengths", "outputs"),
+        hook: Hook | None = None,
+    ) -> Trajectory:
+        """Advance by T control steps and return what was recorded.
+
+        Args:
+            steps: T; not needed if something is given over time.
+            inputs: (T, n_inputs).
+            offset: (T, n_outputs), added to the fed-back outputs; the teacher in teacher forcing.
+            gate: (n_outputs,) or a number; default: 1 with a readout, else 0.
+            forces: (N,) or (T, N) horizontal forces on the nodes [N].
+            record: any of "lengths", "outputs", "positions", "velocities".
+            hook: slow (one Python call a control step): function (time, lengths (L,)) -> (N,)
+                horizontal forces [N] during that step, for laws that nothing else covers.
+
+        Raises:
+            DivergenceError: the simulation blew up.
+            InvalidArgumentError, UnknownNameError: an argument out of bounds.
+        """
+        return join(
+            list(self.stream(steps, inputs, offset, gate, forces, record=record, hook=hook))
+        )
+
+    def stream(
+        self,
+        steps: int | None = None,
+        inputs: object = None,
+        offset: object = None,
+        gate: object = None,
+        forces: object = None,
+        *,
+        record: Sequence[str] = ("lengths", "outputs"),
+        hook: Hook | None = None,
+        chunk: int = CHUNK,
+    ) -> Iterator[Trajectory]:
+        """As `rollout`, yielding chunks: memory stays flat however long the run is."""
+        for name in record:
+            if name not in RECORDABLE:
+                raise UnknownNameError("record", name, RECORDABLE)
+        require_count("chunk", chunk, 1)
+        drive = check_drive(
+            self.body,
+            steps=steps,
+            inputs=inputs,
+            offset=offset,
+            gate=gate,
+            forces=forces,
+            closed=self._w_out is not None,
+            copies=self._copies,
+        )
+        return self._chunks(drive, frozenset(record), hook, 1 if hook else chunk)
+
+    # --- inside ------------------------------------------------------------------------------
+
+    def _checked_readout(self, w_out: object) -> Array:
+        return checked_readout(self.body, w_out)
+
+    def _public(self, array: Array) -> Array:
+        """An engine's array as callers see it: one simulation has no axis of copies."""
+        return array[0]
+
+    def _chunks(
+        self, drive: Drive, record: frozenset[str], hook: Hook | None, chunk: int
+    ) -> Iterator[Trajectory]:
+        self._engine.prepare(drive)
+        for start in range(0, max(drive.steps, 1), chunk):
+            stop = min(start + chunk, drive.steps)
+            now = _with_hook(drive, hook, start, self) if hook else drive
+            yield self._run(now, record, start, stop)
+
+    def _run(self, drive: Drive, record: frozenset[str], start: int, stop: int) -> Trajectory:
+        done = self._engine.steps_done
+        times = self.timestep * np.arange(done, done + stop - start, dtype=np.float64)
+        measured = record - {"outputs"} | ({"lengths"} if "outputs" in record else set())
+        arrays = self._engine.run(drive, tuple(sorted(measured)), start, stop)
+        if "outputs" in record:
+            arrays["outputs"] = self._outputs(arrays["lengths"])
+        public = {name: self._public(arrays[name]) for name in record}
+        return Trajectory(times, final_state=self.state, **public)
+
+    def _outputs(self, lengths: Array) -> Array:
+        """y = W_out^T l + b, (copies, T, n_outputs)."""
+        if self._w_out is None:
+            return np.zeros((*lengths.shape[:-1], self.body.n_outputs))
+        n = self.body.n_springs
+        return lengths @ self._w_out[..., :n, :] + self._w_out[..., n:, :].sum(
+            axis=-2, keepdims=True
+        )
+
+
+def _with_hook(drive: Drive, hook: Hook, step: int, simulation: Simulation) -> Drive:
+    """The drive with the hook's forces for this one step added."""
+    lengths = simulation._public(simulation._engine.current_lengths())
+    forces = as_array("hook's forces", hook(simulation.time, lengths), (simulation.body.n_nodes,))
+    if drive.forces is not None:
+        forces = forces + drive.forces[..., min(step, drive.forces.shape[-2] - 1), :]
+    return replace(drive, forces=np.atleast_2d(forces))

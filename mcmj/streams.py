@@ -1,0 +1,36 @@
+"""Independent random streams by purpose: the same seed never feeds two purposes twice."""
+
+import numpy as np
+
+from mcmj.errors import UnknownNameError
+from mcmj.validation import require_count
+
+# the order is part of every result: only append
+PURPOSES = (
+    "topology",
+    "k1",
+    "k3",
+    "d1",
+    "d3",
+    "masses",
+    "input_weights",
+    "feedback_weights",
+    "teacher_noise",
+    "length_noise",
+    "forces",
+    "initial_state",
+)
+
+
+def stream(seed: int, purpose: str) -> np.random.Generator:
+    """The generator of a seed for a purpose, a child of SeedSequence(seed).
+
+    Raises:
+        InvalidArgumentError: the seed is not an integer >= 0.
+        UnknownNameError: not one of PURPOSES.
+    """
+    require_count("seed", seed, 0)
+    if purpose not in PURPOSES:
+        raise UnknownNameError("random stream", purpose, PURPOSES)
+    child = np.random.SeedSequence(seed, spawn_key=(PURPOSES.index(purpose),))
+    return np.random.default_rng(child)

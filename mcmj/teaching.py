@@ -1,0 +1,91 @@
+"""Teacher forcing: the target is fed back in place of the outputs, and the readout is fitted."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from mcmj.readout import Fit, Regression
+from mcmj.simulation import CHUNK, Simulation
+from mcmj.streams import stream
+from mcmj.targets import Target
+from mcmj.validation import require_number
+
+
+@dataclass(frozen=True)
+class Teaching:
+    """How a readout is taught.
+
+    Attributes:
+        duration: teacher forcing, washout included [s].
+        washout: start of it that the regression leaves out [s].
+        noise: standard deviation of the white noise on the fed-back teacher signal (units of
+            the output); the regression target stays clean. Without it the free run drifts off.
+        length_noise: standard deviation of white noise on the lengths the readout sees [m].
+        ridge_per_row: ridge parameter over the number of rows; s^2 does what a length noise
+            of s would, without randomness.
+        bias: fit a constant too (the paper's readout has none).
+    """
+
+    duration: float = 120.0
+    washout: float = 20.0
+    noise: float = 0.2
+    length_noise: float = 0.0
+    ridge_per_row: float = 0.0
+    bias: bool = False
+
+    def __post_init__(self) -> None:
+        require_number("duration", self.duration, 0.0, open_low=True)
+        require_number("washout", self.washout, 0.0, self.duration)
+        for name in ("noise", "length_noise", "ridge_per_row"):
+            require_number(name, getattr(self, name), 0.0)
+
+
+def teach(
+    simulation: Simulation,
+    target: Target,
+    teaching: Teaching,
+    seed: int,
+    *,
+    on_steps: Callable[[int], object] = lambda steps: None,
+) -> Fit:
+    """Teach a target to a body by teacher forcing, then close the loop with the readout.
+
+    The teacher runs on from the simulation's time, so that afterwards the target's value at
+    `simulation.time` is still what the body should do. Memory does not grow with duration.
+
+    Args:
+        simulation: the body to teach; afterwards its readout is the fitted one.
+        seed: of the noise streams.
+        on_steps: called with the number of steps done after every chunk, for progress bars.
+
+    Raises:
+        DivergenceError: the body blew up under the teacher.
+    """
+    noise, length_noise = stream(seed, "teacher_noise"), stream(seed, "length_noise")
+    step = simulation.timestep
+    total, washout = round(teaching.duration / step), round(teaching.washout / step)
+    regression = Regression(bias=teaching.bias)
+    start_step = round(simulation.time / step)
+    for start in range(0, total, CHUNK):
+        steps = np.arange(start, min(start + CHUNK, total))
+        clean = target.sample((start_step + steps) * step)
+        noisy = clean + teaching.noise * noise.standard_normal(clean.shape)
+        rollout = simulation.rollout(offset=noisy, gate=0.0, record=("lengths",))
+        lengths = rollout.get("lengths")
+        if teaching.length_noise > 0:
+            lengths = lengths + teaching.length_noise * length_noise.standard_normal(lengths.shape)
+        learned = steps >= washout
+        if learned.any():
+            regression.add(lengths[learned], clean[learned])
+        on_steps(len(steps))
+    fit = regression.solve(ridge=teaching.ridge_per_row * (total - washout))
+    simulation.set_readout(fit.w_out)
+    return fit
+
+
+def synchronise(simulation: Simulation, target: Target, duration: float) -> None:
+    """Bring a body onto the target by clean teacher forcing, without learning."""
+    step = simulation.timestep
+    steps = round(simulation.time / step) + np.arange(round(duration / step))
+    simulation.rollout(offset=target.sample(steps * step), gate=0.0, record=())

@@ -1,0 +1,71 @@
+"""Checks at the boundary: arrays and numbers as the rest of the package expects them."""
+
+from collections.abc import Sequence
+
+import numpy as np
+import numpy.typing as npt
+
+from mcmj.errors import InvalidArgumentError
+
+Array = npt.NDArray[np.float64]
+
+
+def as_array(name: str, value: object, shape: Sequence[int | None]) -> Array:
+    """Return `value` as a finite, C-contiguous float64 array of the given shape.
+
+    Args:
+        name: the argument's name, for the error.
+        value: anything NumPy can convert.
+        shape: expected shape; None stands for any length along that axis.
+
+    Raises:
+        InvalidArgumentError: not numbers, another shape, or NaN or infinity inside.
+    """
+    wanted = "(" + ", ".join("any" if n is None else str(n) for n in shape) + ")"
+    try:
+        array = np.array(value, dtype=np.float64, order="C", copy=None)
+    except (TypeError, ValueError) as error:
+        raise InvalidArgumentError(name, f"numbers of shape {wanted}", repr(value)) from error
+    if array.ndim != len(shape) or any(
+        n is not None and n != m for n, m in zip(shape, array.shape, strict=True)
+    ):
+        raise InvalidArgumentError(name, f"shape {wanted}", f"shape {array.shape}")
+    bad = np.argwhere(~np.isfinite(array))
+    if bad.size:
+        where = tuple(int(i) for i in bad[0])
+        raise InvalidArgumentError(name, "finite numbers", f"{array[where]} at index {where}")
+    return array
+
+
+def require_above(name: str, array: Array, low: float, *, strict: bool = True) -> None:
+    """Raise unless every entry is > low (or >= low, if not strict)."""
+    bad = np.flatnonzero(array <= low if strict else array < low)
+    if bad.size:
+        sign = ">" if strict else ">="
+        raise InvalidArgumentError(
+            name, f"all entries {sign} {low:g}", f"{array[bad[0]]:g} at index {bad[0]}"
+        )
+
+
+def require_range(name: str, value: Sequence[float], *, positive: bool = True) -> None:
+    """Raise unless `value` is (low, high) with low <= high, and low > 0 if positive."""
+    low, high = as_array(name, value, (2,))
+    if low > high or (positive and low <= 0):
+        kind = "0 < low <= high" if positive else "low <= high"
+        raise InvalidArgumentError(name, f"(low, high) with {kind}", tuple(value))
+
+
+def require_number(
+    name: str, value: float, low: float, high: float = np.inf, *, open_low: bool = False
+) -> None:
+    """Raise unless low <= value <= high (low < value, if open_low) and value is finite."""
+    inside = np.isfinite(value) and (low < value if open_low else low <= value) and value <= high
+    if not inside:
+        left = "(" if open_low else "["
+        raise InvalidArgumentError(name, f"a number in {left}{low:g}, {high:g}]", value)
+
+
+def require_count(name: str, value: int, low: int) -> None:
+    """Raise unless value is an integer >= low."""
+    if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < low:
+        raise InvalidArgumentError(name, f"an integer >= {low}", repr(value))

@@ -1,0 +1,102 @@
+"""Fig. 5: teach a body a limit cycle and let it run free in MuJoCo.
+
+With no arguments: the general body and all three tasks of the paper.
+"""
+
+import sys
+from pathlib import Path
+
+import numpy as np
+from rich.console import Console
+from rich.table import Table
+
+from mcmj import plotting, store
+from mcmj.cli import Output, main
+from mcmj.experiments.limit_cycle import Config, Result, run, total_steps
+from mcmj.mjcf import to_mjcf
+from mcmj.progress import progress_bar
+from mcmj.rendering import RenderingUnavailableError, limit_cycle_video
+
+
+def work(config: Config, output: Output, out: Path) -> None:
+    with progress_bar("teaching and running", total_steps(config), quiet=output.quiet) as on_steps:
+        result = run(config, on_steps=on_steps)
+    write(result, out)
+    if output.video:
+        write_videos(result, out)
+    if not output.quiet:
+        show(result, out)
+
+
+def write(result: Result, out: Path) -> None:
+    """metrics.json, body.xml with all readouts, trajectory.npz and the figure."""
+    config, tasks = result.config, result.tasks
+    readouts = {name: task.w_out for name, task in tasks.items()}
+    xml = to_mjcf(
+        result.body,
+        timestep=config.timestep,
+        integrator=config.integrator,
+        w_out=next(iter(readouts.values())),
+        readouts=readouts,
+        provenance={"body": result.source, "config": store.plain(config)},
+    )
+    store.write_text(out / "body.xml", xml)
+    arrays = {"timestep": np.array(config.timestep)}
+    for name, task in tasks.items():
+        arrays[f"{name}/start_time"], arrays[f"{name}/outputs"] = task.times[0], task.outputs
+    store.write_arrays(out / "trajectory.npz", arrays, config, config.noise_seed)
+    figure = plotting.limit_cycle_figure(
+        result.body,
+        [(task.target, task.times, task.outputs, task.errors) for task in tasks.values()],
+        free_run=config.free_run,
+        window=config.window,
+    )
+    plotting.save(figure, out / "limit_cycle.png")
+    store.write_metrics(
+        out / "metrics.json", "limit_cycle", config, config.noise_seed, result.metrics
+    )
+
+
+def write_videos(result: Result, out: Path) -> None:
+    """One MP4 a task, of the free run's last part; says in one line if there is no OpenGL."""
+    try:
+        for name, task in result.tasks.items():
+            last = len(task.positions)
+            limit_cycle_video(
+                out / f"{name}.mp4",
+                result.body,
+                task.target,
+                task.times[-last:],
+                task.positions,
+                task.outputs[-last:],
+            )
+    except RenderingUnavailableError as error:
+        print(f"limit_cycle: no video: {error}", file=sys.stderr)
+
+
+def show(result: Result, out: Path) -> None:
+    """The errors as a table."""
+    config = result.config
+    table = Table(title=f"last {config.window:g} s of {config.free_run:g} s in closed loop")
+    for column in ("task", "orbit error", "period error", "amplitude error", "training NRMSE"):
+        table.add_column(column, justify="left" if column == "task" else "right")
+    for name, task in result.tasks.items():
+        errors = task.errors
+        table.add_row(
+            name,
+            f"{100 * errors['orbit_error']:.3f} %",
+            f"{100 * errors['period_error']:.4f} %",
+            f"{100 * errors['amplitude_error']:.3f} %",
+            f"{task.fit.train_nrmse:.2e}" if task.fit else "not taught",
+        )
+    console = Console()
+    console.print(table)
+    console.print(
+        f"{result.body!r}: {result.steps_per_second:,.0f} steps a second in closed loop, "
+        f"{result.closed_loop_cost_ratio:.2f} x a bare mj_step loop"
+    )
+    console.print(f"results in {out}")
+
+
+if __name__ == "__main__":
+    main("limit_cycle", Config, work)
