@@ -24,6 +24,7 @@ OUTPUT_STYLES: tuple[dict[str, Any], ...] = (
     {"color": "black", "ls": "-"},
     {"color": "#1f4fd6", "ls": "--"},
 )
+TASK_COLOURS = ("#1f4fd6", "black", "#2a9d3a")
 TITLES = {
     "van_der_pol": "Van der Pol",
     "quadratic": "Quadratic limit cycle",
@@ -129,6 +130,27 @@ def limit_cycle_figure(
             ]
             figure.legend(handles=handles, loc="outside upper center", ncols=3, frameon=False)
     draw_body(figure.add_subplot(grid[:, 3]), body)
+    return figure
+
+
+def success_figure(orbit_errors: dict[str, Array], threshold: float) -> Figure:
+    """Orbit errors of many bodies, sorted, one curve a task; failures stand above the line."""
+    figure = new_figure(7.5, 4.2)
+    axes = figure.add_subplot()
+    top = 2.0  # everything worse, blow-ups too, is drawn here
+    for (name, errors), colour in zip(orbit_errors.items(), TASK_COLOURS, strict=False):
+        good = int((errors < threshold).sum())
+        axes.semilogy(
+            np.arange(1, len(errors) + 1), np.sort(np.minimum(errors, top)), ".-", ms=4, lw=0.8,
+            color=colour, label=f"{TITLES.get(name, name)}: {good} of {len(errors)}",
+        )  # fmt: skip
+    axes.axhline(threshold, color=TARGET_COLOUR, ls="--", lw=1)
+    axes.annotate(
+        f"success below {100 * threshold:g} %", (1, threshold * 1.08), color=TARGET_COLOUR
+    )
+    axes.set(xlabel="body, sorted by error (each task for itself)", ylabel="orbit error")
+    axes.legend(frameon=False)
+    axes.grid(alpha=0.3)
     return figure
 
 

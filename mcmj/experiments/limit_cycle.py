@@ -12,7 +12,7 @@ import numpy as np
 from mcmj import metrics
 from mcmj.body import Body
 from mcmj.bodyfile import body_of_model, load_model, provenance_of_model, readouts_of_model
-from mcmj.errors import InvalidArgumentError, UnknownNameError
+from mcmj.errors import DivergenceError, InvalidArgumentError, UnknownNameError
 from mcmj.generator import BodySettings, draw_body
 from mcmj.library import body_path
 from mcmj.mjcf import DEFAULT_INTEGRATOR
@@ -135,24 +135,43 @@ def total_steps(config: Config) -> int:
 
 
 def run(config: Config, *, on_steps: OnSteps = lambda steps: None) -> Result:
-    """Teach and run every task.
+    """Teach and run every task, and measure what the closed loop costs.
 
     Raises:
         DivergenceError: a simulation blew up.
         BodyFileError, InvalidArgumentError: a body that cannot do the task.
     """
-    body, readouts, source = get_body(config)
+    body, _, source = get_body(config)
+    tasks = {}
+    for name, outcome in run_tasks(config, on_steps=on_steps).items():
+        if isinstance(outcome, DivergenceError):
+            raise outcome
+        tasks[name] = outcome
+    speed, ratio = closed_loop_cost(body, next(iter(tasks.values())).w_out, config)
+    return Result(config, body, source, tasks, speed, ratio)
+
+
+def run_tasks(
+    config: Config, *, on_steps: OnSteps = lambda steps: None
+) -> dict[str, TaskResult | DivergenceError]:
+    """Teach and run every task, on several threads; a task that blew up is its error.
+
+    Raises:
+        BodyFileError, InvalidArgumentError: a body that cannot do the task.
+    """
+    body, readouts, _ = get_body(config)
     targets = {name: target(name) for name in config.tasks}
     for wanted in targets.values():
         _check_task(config, body, wanted)
+
+    def outcome(name: str) -> TaskResult | DivergenceError:
+        try:
+            return _run_task(config, body, targets[name], readouts.get(name), on_steps)
+        except DivergenceError as error:
+            return error
+
     with ThreadPoolExecutor(max_workers=os.cpu_count()) as pool:  # rollouts release the GIL
-        futures = {
-            name: pool.submit(_run_task, config, body, wanted, readouts.get(name), on_steps)
-            for name, wanted in targets.items()
-        }
-        tasks = {name: future.result() for name, future in futures.items()}
-    speed, ratio = closed_loop_cost(body, next(iter(tasks.values())).w_out, config)
-    return Result(config, body, source, tasks, speed, ratio)
+        return dict(zip(targets, pool.map(outcome, targets), strict=True))
 
 
 def _check_task(config: Config, body: Body, wanted: Target) -> None:

@@ -1,0 +1,97 @@
+"""How many random bodies learn the three limit cycles: the same settings, consecutive seeds."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from scipy.stats import binomtest
+
+from mcmj.errors import DivergenceError
+from mcmj.experiments import limit_cycle
+from mcmj.generator import BodySettings
+from mcmj.progress import OnSteps
+from mcmj.targets import TARGETS
+from mcmj.teaching import Teaching
+from mcmj.validation import Array, require_count, require_number
+
+
+@dataclass(frozen=True)
+class Config:
+    """What to run.
+
+    Attributes:
+        seeds: number of bodies.
+        first_seed: their seeds are consecutive from here.
+        threshold: largest orbit error of a success.
+        free_run: length of each free run in closed loop [s].
+        window: the errors are those of this last part of it [s].
+        settings: what the bodies are drawn from.
+        teaching: how the readouts are taught.
+    """
+
+    seeds: int = 50
+    first_seed: int = 0
+    threshold: float = 0.05
+    free_run: float = 60.0
+    window: float = 20.0
+    settings: BodySettings = field(default_factory=BodySettings)
+    teaching: Teaching = field(default_factory=Teaching)
+
+    def __post_init__(self) -> None:
+        require_count("seeds", self.seeds, 1)
+        require_count("first_seed", self.first_seed, 0)
+        require_number("threshold", self.threshold, 0.0, open_low=True)
+
+    def of_seed(self, seed: int) -> limit_cycle.Config:
+        """The limit-cycle experiment of one body."""
+        return limit_cycle.Config(
+            seed=seed,
+            free_run=self.free_run,
+            window=self.window,
+            settings=self.settings,
+            teaching=self.teaching,
+        )
+
+
+@dataclass(frozen=True)
+class Result:
+    """Errors (seeds,) by task; infinite where a body blew up."""
+
+    config: Config
+    orbit_errors: dict[str, Array]
+    period_errors: dict[str, Array]
+
+    @property
+    def metrics(self) -> dict[str, object]:
+        """Rates with their 95 % Wilson intervals, and median errors."""
+        successes = {n: e < self.config.threshold for n, e in self.orbit_errors.items()}
+        table: dict[str, object] = {
+            name: {
+                **_rate(good),
+                "median_orbit_error": float(np.median(self.orbit_errors[name])),
+                "median_period_error": float(np.median(self.period_errors[name])),
+                "orbit_errors": self.orbit_errors[name],
+            }
+            for name, good in successes.items()
+        }
+        table["all_tasks"] = _rate(np.logical_and.reduce(list(successes.values())))
+        return table
+
+
+def run(config: Config, *, on_seeds: OnSteps = lambda seeds: None) -> Result:
+    """Teach and run every body on all tasks; a body that blows up counts as a failure."""
+    orbit = {name: np.full(config.seeds, np.inf) for name in TARGETS}
+    period = {name: np.full(config.seeds, np.inf) for name in TARGETS}
+    for index in range(config.seeds):
+        one = config.of_seed(config.first_seed + index)
+        for name, outcome in limit_cycle.run_tasks(one).items():
+            if not isinstance(outcome, DivergenceError):
+                orbit[name][index] = outcome.errors["orbit_error"]
+                period[name][index] = outcome.errors["period_error"]
+        on_seeds(1)
+    return Result(config, orbit, period)
+
+
+def _rate(good: np.ndarray) -> dict[str, object]:
+    count, total = int(good.sum()), len(good)
+    interval = binomtest(count, total).proportion_ci(method="wilson")
+    return {"successes": count, "of": total, "interval_95": [interval.low, interval.high]}

@@ -1,0 +1,48 @@
+"""How many random bodies of consecutive seeds learn all three limit cycles."""
+
+from pathlib import Path
+from typing import Any
+
+from rich.console import Console
+from rich.table import Table
+
+from mcmj import plotting, store
+from mcmj.cli import Output, main
+from mcmj.experiments.success_rate import Config, Result, run
+from mcmj.progress import progress_bar
+
+
+def work(config: Config, output: Output, out: Path) -> None:
+    with progress_bar("bodies", config.seeds, quiet=output.quiet) as on_seeds:
+        result = run(config, on_seeds=on_seeds)
+    figure = plotting.success_figure(result.orbit_errors, config.threshold)
+    plotting.save(figure, out / "success_rate.png")
+    store.write_metrics(
+        out / "metrics.json", "success_rate", config, config.first_seed, result.metrics
+    )
+    if not output.quiet:
+        show(result, out)
+
+
+def show(result: Result, out: Path) -> None:
+    config = result.config
+    table = Table(title=f"orbit error below {100 * config.threshold:g} %")
+    for column in ("task", "bodies", "95 % interval", "median orbit error", "median period error"):
+        table.add_column(column)
+    for name, row in result.metrics.items():
+        cells: dict[str, Any] = dict(row)  # type: ignore[call-overload]
+        low, high = cells["interval_95"]
+        errors = [
+            f"{100 * cells[key]:.3f} %" if key in cells else ""
+            for key in ("median_orbit_error", "median_period_error")
+        ]
+        table.add_row(
+            name, f"{cells['successes']} of {cells['of']}", f"{low:.2f} to {high:.2f}", *errors
+        )
+    console = Console()
+    console.print(table)
+    console.print(f"results in {out}")
+
+
+if __name__ == "__main__":
+    main("success_rate", Config, work)
