@@ -21,6 +21,7 @@ def _choose_gl() -> None:
 
 _choose_gl()
 
+from mcmj import reference  # noqa: E402
 from mcmj.body import Body  # noqa: E402  (mujoco reads MUJOCO_GL at import)
 from mcmj.bodyfile import from_mjcf  # noqa: E402
 from mcmj.ensemble import Ensemble  # noqa: E402
@@ -44,6 +45,7 @@ __all__ = [
     "fit_readout",
     "from_mjcf",
     "random_body",
+    "reference",
     "target",
     "teach",
     "to_mjcf",

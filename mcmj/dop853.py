@@ -15,6 +15,7 @@ from mcmj.trajectory import State, Trajectory
 from mcmj.validation import Array
 
 Signal = Callable[[float], Array]
+Push = Callable[[float, Array], Array]
 
 RTOL = 1e-12
 ATOL_SHARE = 1e-3  # absolute tolerance, over the relative one, in units of 1 m and 1 m/s
@@ -58,14 +59,7 @@ def integrate_held(
         push = _held_push(body, drive, outputs_of(lengths, w_out, body.n_outputs), k)
         until = k + _same_until(body, drive, k)
         times = timestep * np.arange(until - k + 1, dtype=np.float64)
-        states, first_step = _solve(
-            body,
-            lambda t, p, push=push: push,
-            state,
-            times,
-            rtol,
-            first_step,
-        )
+        states, first_step = _solve(body, _constant(push), state, times, rtol, first_step)
         positions = states[:-1, : 2 * body.n_nodes].reshape(-1, body.n_nodes, 2)
         recorded[k:until] = spring_lengths(positions, body.springs)
         state, k = states[-1], until
@@ -106,6 +100,10 @@ def integrate_continuous(
     return _trajectory(body, lengths, states[-1], w_out, timestep, start)
 
 
+def _constant(push: Array) -> Push:
+    return lambda t, positions: push
+
+
 def _split(body: Body, state: Array) -> tuple[Array, Array]:
     positions, velocities = state.reshape(2, body.n_nodes, 2)
     return positions, velocities
@@ -138,7 +136,7 @@ def _same_until(body: Body, drive: Drive, k: int) -> int:
 
 def _solve(
     body: Body,
-    push: Callable[[float, Array], Array],
+    push: Push,
     state: Array,
     times: Array,
     rtol: float,

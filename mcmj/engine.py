@@ -61,6 +61,8 @@ class Engine:
                 control_period=timestep if substeps > 1 else 0.0,
             )
         )
+        if substeps > 1:  # the first sample at t = 0: MJCF takes no phase beyond a period
+            self.model.sensor_interval[: body.n_springs, 1] -= timestep
         law = spring_law(springs)
         self._uses_law = law is not None
         if law is not None:

@@ -194,13 +194,17 @@ def _add_push(tendons: ET.Element, name: str, body: Body, weights: Array) -> Non
 def _add_sensors(
     root: ET.Element, body: Body, timestep: float, delay: float, period: float
 ) -> None:
-    """Sensors 0 .. L-1 feed the readout; if they are delayed or held, L more measure lengths."""
+    """Sensors 0 .. L-1 feed the readout; if they are delayed or held, L more measure lengths.
+
+    Delay and phase are half a physics step early: MuJoCo compares sums of steps, whose rounding
+    would otherwise miss a sample now and then.
+    """
     sensors = ET.SubElement(root, "sensor")
     timing: dict[str, str] = {}
     if delay > 0:
-        timing["delay"] = numbers(delay)
+        timing["delay"] = numbers(delay - timestep / 2)
     if period > 0:
-        timing["interval"] = numbers([period, 0])
+        timing["interval"] = numbers([period, -timestep / 2])
     if timing:
         samples = int(np.ceil(delay / (period or timestep) - 1e-9)) + 1
         timing["nsample"] = str(samples)
