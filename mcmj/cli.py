@@ -22,11 +22,13 @@ class Output:
         out: folder for metrics.json and the figures; default: results/<script>.
         quiet: no progress bars and no table.
         video: make videos.
+        json: print the metrics as JSON instead of a table.
     """
 
     out: Path | None = None
     quiet: bool = False
     video: bool = True
+    json: bool = False
 
 
 def main(name: str, config_type: type[C], work: Callable[[C, Output, Path], None]) -> None:

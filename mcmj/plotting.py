@@ -154,6 +154,24 @@ def success_figure(orbit_errors: dict[str, Array], threshold: float) -> Figure:
     return figure
 
 
+def growth_figure(rows: Sequence[dict[str, float]]) -> Figure:
+    """Cost of a step and of compiling against the number of springs."""
+    figure = new_figure(9.0, 3.8)
+    left, right = figure.subplots(1, 2)
+    springs = [row["springs"] for row in rows]
+    for engine, colour in (("mujoco", "black"), ("twin", "#1f4fd6")):
+        costs = [row[f"{engine}_ns_per_spring_step"] for row in rows]
+        left.loglog(springs, costs, "o-", color=colour, label=engine)
+    left.set(xlabel="springs", ylabel="cost [ns per spring and step]")
+    left.legend(frameon=False)
+    left.set_title("flat = linear in the size of the body")
+    right.loglog(springs, [row["compile_seconds"] for row in rows], "o-", color="black")
+    right.set(xlabel="springs", ylabel="time to build a Simulation [s]")
+    for axes in (left, right):
+        axes.grid(alpha=0.3, which="both")
+    return figure
+
+
 def _best_phase(outputs: Array, target: Target, times: Array) -> float:
     """Time shift of the target that fits the outputs best: phases drift apart, shapes do not."""
     sparse = slice(None, None, max(1, len(times) // 2000))

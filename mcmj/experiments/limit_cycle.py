@@ -1,8 +1,6 @@
 """Fig. 5: one body learns a limit cycle by teacher forcing, then runs free in MuJoCo."""
 
 import os
-import time
-from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, dataclass, field
 
@@ -21,6 +19,7 @@ from mcmj.readout import Fit
 from mcmj.simulation import Simulation
 from mcmj.targets import TARGETS, Target, target
 from mcmj.teaching import Teaching, synchronise, teach
+from mcmj.timing import interleaved_seconds, median_ratio
 from mcmj.validation import Array, require_number
 
 
@@ -235,17 +234,12 @@ def closed_loop_cost(
         body, w_out=w_out, timestep=config.timestep, integrator=config.integrator
     )
     bare = mujoco.MjData(simulation.model)
-
-    def seconds(work: Callable[[], object]) -> float:
-        start = time.perf_counter()
-        work()
-        return time.perf_counter() - start
-
-    mujoco.mj_step(simulation.model, bare, nstep=steps)
-    simulation.rollout(steps)
-    closed, ratios = [], []
-    for _ in range(repeats):
-        before = seconds(lambda: mujoco.mj_step(simulation.model, bare, nstep=steps))
-        closed.append(seconds(lambda: simulation.rollout(steps)))
-        ratios.append(closed[-1] / before)
-    return steps / float(np.median(closed)), float(np.median(ratios))
+    seconds = interleaved_seconds(
+        {
+            "bare": lambda: mujoco.mj_step(simulation.model, bare, nstep=steps),
+            "closed": lambda: simulation.rollout(steps),
+        },
+        repeats,
+    )
+    speed = steps / float(np.median(seconds["closed"]))
+    return speed, median_ratio(seconds, "closed", "bare")

@@ -1,0 +1,276 @@
+"""All speed claims in one place: ratios measured side by side, medians of several rounds."""
+
+import os
+import platform
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+
+from mcmj.body import Body
+from mcmj.drive import check_drive
+from mcmj.ensemble import Ensemble
+from mcmj.errors import InvalidArgumentError
+from mcmj.experiments.full_scene import full_scene
+from mcmj.generator import random_body
+from mcmj.simulation import Simulation
+from mcmj.timing import Work, interleaved_seconds, median_ratio
+from mcmj.twin.population import Population
+from mcmj.validation import Array, require_count
+
+BATCH = 64  # bodies in one call of the twin
+READOUT_SIZE = 1e-4  # small weights: what they are costs nothing, and the loop stays quiet
+
+
+@dataclass(frozen=True)
+class Config:
+    """What to measure.
+
+    Attributes:
+        nodes: size of the body of most measurements.
+        sizes: numbers of nodes of the growth curves.
+        steps: control steps of each measured piece of work.
+        repeats: rounds, of which the median counts.
+        seed: of the bodies.
+        memory_steps: length of the run whose peak memory is measured; 0: leave it out.
+    """
+
+    nodes: int = 30
+    sizes: tuple[int, ...] = (10, 30, 100, 300, 1000, 3000)
+    steps: int = 2000
+    repeats: int = 9
+    seed: int = 0
+    memory_steps: int = 1_000_000
+
+    def __post_init__(self) -> None:
+        for name, low in (("nodes", 3), ("steps", 10), ("repeats", 1), ("memory_steps", 0)):
+            require_count(name, getattr(self, name), low)
+        if not self.sizes or min(self.sizes) < 3:
+            raise InvalidArgumentError("sizes", "numbers of nodes >= 3", self.sizes)
+
+
+@dataclass(frozen=True)
+class Result:
+    """Measured numbers, as in metrics.json, and the machine."""
+
+    config: Config
+    metrics: dict[str, object]
+
+
+def run(config: Config, *, on_parts: Callable[[int], object] = lambda parts: None) -> Result:
+    """Measure everything; PARTS times `on_parts(1)` is called."""
+    metrics: dict[str, object] = {"machine": machine()}
+    body = random_body(config.seed, config.nodes)
+    for part in PARTS:
+        metrics.update(part(config, body))
+        on_parts(1)
+    return Result(config, metrics)
+
+
+def machine() -> dict[str, object]:
+    """What it ran on, and how busy that was."""
+    return {
+        "platform": platform.platform(),
+        "processor": _processor_name(),
+        "cores": os.cpu_count(),
+        "load_average_1min": os.getloadavg()[0],
+    }
+
+
+def loop_costs(config: Config, body: Body) -> dict[str, object]:
+    """The pipeline against a bare mj_step loop, and every way of computing spring forces."""
+    w_out, steps = small_readout(body), config.steps
+    closed = Simulation(body, w_out=w_out)
+    python_steps = max(10, steps // 10)
+    bare = mujoco.MjData(closed.model)
+    hook, no_force = Simulation(body), np.zeros(body.n_nodes)
+    works: dict[str, Work] = {
+        "bare": lambda: mujoco.mj_step(closed.model, bare, nstep=steps),
+        "closed": lambda: closed.rollout(steps),
+        "python_hook": lambda: hook.rollout(python_steps, hook=lambda now, lengths: no_force),
+    }
+    open_loop = Simulation(body)
+    works["open"] = lambda: open_loop.rollout(steps)
+    for springs in ("cubic", "tansig"):
+        simulation = Simulation(body, w_out=w_out, springs=springs)
+        works[f"{springs}_hook"] = lambda s=simulation: s.rollout(steps)  # type: ignore[misc]
+    for integrator in ("RK4", "discrete", "implicit", "implicitfast"):
+        simulation = Simulation(body, w_out=w_out, integrator=integrator)
+        works[integrator] = lambda s=simulation: s.rollout(steps)  # type: ignore[misc]
+    seconds = interleaved_seconds(works, config.repeats)
+    seconds["python_hook"] = [s * steps / python_steps for s in seconds["python_hook"]]
+    ns = float(np.median(seconds["closed"])) / (steps * body.n_springs) * 1e9
+    return {
+        "open_loop_ratio": median_ratio(seconds, "open", "bare"),
+        "closed_loop_ratio": median_ratio(seconds, "closed", "bare"),
+        "mujoco_ns_per_spring_step": ns,
+        "ratio_to_closed_loop": {
+            name: median_ratio(seconds, name, "closed")
+            for name in seconds
+            if name not in ("bare", "closed", "open")
+        },
+    }
+
+
+def twin_costs(config: Config, body: Body) -> dict[str, object]:
+    """The compiled twin in closed loop, lengths recorded: one body, and per body of a batch."""
+    steps = config.steps
+    simulation = Simulation(body, w_out=small_readout(body))
+    others = [random_body(config.seed + k, config.nodes) for k in range(BATCH)]
+    single, mixed = _population([body]), _population(others)
+    packed = _population([body] * BATCH, packed=True)
+    batch_steps = max(10, steps // 8)
+    seconds = interleaved_seconds(
+        {
+            "mujoco": lambda: simulation.rollout(steps),
+            "twin": _twin_work(single, steps),
+            "mixed": _twin_work(mixed, batch_steps),
+            "packed": _twin_work(packed, batch_steps),
+        },
+        config.repeats,
+    )
+    springs = sum(other.n_springs for other in others)
+    for name, count in (("mixed", springs), ("packed", BATCH * body.n_springs)):
+        scale = steps / batch_steps * body.n_springs / count  # to one body of the same size
+        seconds[name] = [s * scale for s in seconds[name]]
+
+    def ns(name: str) -> float:
+        return float(np.median(seconds[name])) / (steps * body.n_springs) * 1e9
+
+    return {
+        "twin_ratio": median_ratio(seconds, "twin", "mujoco"),
+        "twin_batch_ratio": median_ratio(seconds, "packed", "mujoco"),
+        "twin_batch_mixed_topology_ratio": median_ratio(seconds, "mixed", "mujoco"),
+        "twin_ns_per_spring_step": ns("twin"),
+        "twin_batch_ns_per_spring_step": ns("packed"),
+        "twin_batch_mixed_topology_ns_per_spring_step": ns("mixed"),
+    }
+
+
+def thread_speedups(config: Config, body: Body) -> dict[str, object]:
+    """Two threads against one, for MuJoCo and for the twin."""
+    w_out, steps = small_readout(body), max(10, config.steps // 4)
+    others = [random_body(config.seed + k, config.nodes) for k in range(BATCH)]
+    ensembles = {n: Ensemble(body, copies=8, threads=n, w_out=w_out) for n in (1, 2)}
+    twins = {n: _population(others, threads=n) for n in (1, 2)}
+    works: dict[str, Work] = {}
+    for n in (1, 2):
+        works[f"mujoco{n}"] = lambda e=ensembles[n]: e.rollout(steps)  # type: ignore[misc]
+        works[f"twin{n}"] = _twin_work(twins[n], steps)
+    seconds = interleaved_seconds(works, config.repeats)
+    return {
+        "threads2_speedup": median_ratio(seconds, "mujoco1", "mujoco2"),
+        "twin_threads2_speedup": median_ratio(seconds, "twin1", "twin2"),
+    }
+
+
+def scene_costs(config: Config, body: Body) -> dict[str, object]:
+    """mj_step of a needlessly complete scene over the minimal one's."""
+    minimal = Simulation(body).model
+    works: dict[str, Work] = {}
+    for name, model in (("minimal", minimal), ("full", full_scene(body))):
+        data = mujoco.MjData(model)
+        works[name] = lambda m=model, d=data: mujoco.mj_step(m, d, nstep=config.steps // 4)  # type: ignore[misc]
+    seconds = interleaved_seconds(works, config.repeats)
+    return {"full_scene_ratio": median_ratio(seconds, "full", "minimal")}
+
+
+def start_up(config: Config, body: Body) -> dict[str, object]:
+    """Seconds to import, and to import and install the callbacks from Numba's cache."""
+    snippets = {
+        "import_seconds": "import mcmj",
+        "import_and_callbacks_seconds": "from mcmj import laws; laws.install(springs=True)",
+    }
+    seconds = interleaved_seconds(
+        {
+            name: lambda code=code: subprocess.run([sys.executable, "-c", code], check=True)  # type: ignore[misc]
+            for name, code in {"empty": "pass", **snippets}.items()
+        },
+        repeats=3,
+    )
+    empty = float(np.median(seconds["empty"]))
+    return {name: float(np.median(seconds[name])) - empty for name in snippets}
+
+
+def growth(config: Config, body: Body) -> dict[str, object]:
+    """Step time, twin's step time and compile time against the size of the body."""
+    rows = []
+    for nodes in config.sizes:
+        other = random_body(config.seed, nodes)
+        start = time.perf_counter()
+        simulation = Simulation(other, w_out=small_readout(other))
+        compiled = time.perf_counter() - start
+        steps = max(10, config.steps * 30 // nodes // 2)
+        seconds = interleaved_seconds(
+            {
+                "mujoco": lambda s=simulation, n=steps: s.rollout(n),  # type: ignore[misc]
+                "twin": _twin_work(_population([other]), steps),
+            },
+            min(config.repeats, 5),
+        )
+        per_spring = 1e9 / (steps * other.n_springs)
+        rows.append(
+            {
+                "nodes": nodes,
+                "springs": other.n_springs,
+                "compile_seconds": compiled,
+                "mujoco_ns_per_spring_step": float(np.median(seconds["mujoco"])) * per_spring,
+                "twin_ns_per_spring_step": float(np.median(seconds["twin"])) * per_spring,
+            }
+        )
+    return {"growth": rows}
+
+
+def memory(config: Config, body: Body) -> dict[str, object]:
+    """Peak resident memory of a process that streams a long closed-loop run, in MB."""
+    if config.memory_steps == 0:
+        return {"million_step_peak_mb": None}
+    code = (
+        "import resource, sys, numpy as np, mcmj\n"
+        f"body = mcmj.random_body({config.seed}, {config.nodes})\n"
+        f"sim = mcmj.Simulation(body, w_out=np.full((body.n_springs, 2), {READOUT_SIZE}))\n"
+        f"n = sum(len(c.lengths) for c in sim.stream({config.memory_steps}))\n"
+        f"assert n == {config.memory_steps}\n"
+        "print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True)
+    return {"million_step_peak_mb": float(done.stdout)}
+
+
+PARTS = (loop_costs, twin_costs, thread_speedups, scene_costs, start_up, growth, memory)
+
+
+def small_readout(body: Body) -> Array:
+    """A readout (L, n_outputs) that closes the loop and does next to nothing."""
+    return np.full((body.n_springs, body.n_outputs), READOUT_SIZE)
+
+
+def _population(bodies: list[Body], **options: object) -> Population:
+    readouts = [small_readout(body) for body in bodies]
+    return Population(bodies, readouts, method="semi_implicit_euler", **options)  # type: ignore[arg-type]
+
+
+def _twin_work(population: Population, steps: int) -> Work:
+    drive = check_drive(
+        population.bodies[0],
+        steps=steps,
+        inputs=None,
+        offset=None,
+        gate=None,
+        forces=None,
+        closed=True,
+    )
+    return lambda: population.run(drive, 0, steps)
+
+
+def _processor_name() -> str:
+    try:
+        with open("/proc/cpuinfo") as file:
+            names = [line.split(":", 1)[1].strip() for line in file if "model name" in line]
+        return names[0] if names else platform.processor()
+    except OSError:
+        return platform.processor()
