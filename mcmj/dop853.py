@@ -18,6 +18,7 @@ Signal = Callable[[float], Array]
 Push = Callable[[float, Array], Array]
 
 RTOL = 1e-12
+EVALUATIONS_PER_STEP = 5000  # give up beyond this many evaluations in one control step
 ATOL_SHARE = 1e-3  # absolute tolerance, over the relative one, in units of 1 m and 1 m/s
 
 
@@ -144,7 +145,13 @@ def _solve(
 ) -> tuple[Array, float | None]:
     """States (T + 1, 4 N) at times (T + 1,), and a good first step for the next piece."""
 
+    budget = EVALUATIONS_PER_STEP * (len(times) - 1)
+
     def rhs(t: float, state: Array) -> Array:
+        nonlocal budget
+        budget -= 1
+        if budget < 0 or not np.isfinite(state).all():
+            raise _divergence(float(t))
         positions, velocities = _split(body, state)
         change = accelerations(body, positions, velocities, push(t, positions))
         return np.concatenate([np.where(body.fixed[:, None], 0.0, velocities), change], axis=None)
@@ -161,14 +168,18 @@ def _solve(
             atol=rtol * ATOL_SHARE,
             first_step=None if first_step is None else min(first_step, duration),
         )
-    if not solution.success or not np.isfinite(solution.y).all():
-        raise DivergenceError(
-            f"dop853: the body blew up after t = {times[0]:.6g} s ({solution.message})",
-            time=float(times[0]),
-            steps_done=0,
-        )
+    if not solution.success:
+        raise _divergence(float(solution.t[-1]))
     states = solution.y.T if len(times) > 2 else solution.y.T[[0, -1]]
     return states, float(duration) if len(times) == 2 and len(solution.t) == 2 else None
+
+
+def _divergence(time: float) -> DivergenceError:
+    return DivergenceError(
+        f"dop853: the body blew up, or is too stiff for an explicit method, at t = {time:.6g} s",
+        time=time,
+        steps_done=0,
+    )
 
 
 def _trajectory(

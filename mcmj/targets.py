@@ -1,5 +1,6 @@
 """What a body is taught: limit cycles from an accurate integrator, closed curves, arrays."""
 
+import functools
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
@@ -142,8 +143,9 @@ TARGETS: dict[str, Callable[[], Target]] = {
 }
 
 
+@functools.cache
 def target(name: str) -> Target:
-    """A target of the paper by its name.
+    """A target of the paper by its name; integrated once a process.
 
     Raises:
         UnknownNameError: no such target.

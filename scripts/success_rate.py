@@ -9,6 +9,8 @@ from rich.table import Table
 from mcmj import plotting, store
 from mcmj.cli import Output, main
 from mcmj.experiments.success_rate import Config, Result, run
+from mcmj.generator import draw_body
+from mcmj.mjcf import to_mjcf
 from mcmj.progress import progress_bar
 
 
@@ -17,11 +19,28 @@ def work(config: Config, output: Output, out: Path) -> None:
         result = run(config, on_seeds=on_seeds)
     figure = plotting.success_figure(result.orbit_errors, config.threshold)
     plotting.save(figure, out / "success_rate.png")
+    store.write_text(out / "best.xml", best_body(result))
     store.write_metrics(
         out / "metrics.json", "success_rate", config, config.first_seed, result.metrics
     )
     if not output.quiet:
         show(result, out)
+
+
+def best_body(result: Result) -> str:
+    """MJCF of the best body, with its provenance; no readout: it is taught in 120 s."""
+    seed, config = result.best_seed, result.config
+    errors = {name: e[seed - config.first_seed] for name, e in result.orbit_errors.items()}
+    provenance = {
+        "seed": seed,
+        "settings": store.plain(config.settings),
+        "selected": f"best of seeds {config.first_seed} to {config.first_seed + config.seeds - 1}",
+        "orbit_errors": store.plain(errors),
+        "free_run": config.free_run,
+        "teaching": store.plain(config.teaching),
+        "versions": store.versions(),
+    }
+    return to_mjcf(draw_body(seed, config.settings), provenance=provenance)
 
 
 def show(result: Result, out: Path) -> None:
@@ -30,6 +49,8 @@ def show(result: Result, out: Path) -> None:
     for column in ("task", "bodies", "95 % interval", "median orbit error", "median period error"):
         table.add_column(column)
     for name, row in result.metrics.items():
+        if name == "best_seed":
+            continue
         cells: dict[str, Any] = dict(row)  # type: ignore[call-overload]
         low, high = cells["interval_95"]
         errors = [
@@ -41,6 +62,7 @@ def show(result: Result, out: Path) -> None:
         )
     console = Console()
     console.print(table)
+    console.print(f"best body: seed {result.best_seed}, written to {out / 'best.xml'}")
     console.print(f"results in {out}")
 
 

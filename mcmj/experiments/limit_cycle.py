@@ -6,6 +6,7 @@ from dataclasses import asdict, dataclass, field
 
 import mujoco
 import numpy as np
+from threadpoolctl import threadpool_limits
 
 from mcmj import metrics
 from mcmj.body import Body
@@ -169,7 +170,8 @@ def run_tasks(
         except DivergenceError as error:
             return error
 
-    with ThreadPoolExecutor(max_workers=os.cpu_count()) as pool:  # rollouts release the GIL
+    # rollouts release the GIL; BLAS threads on top would wait for each other
+    with threadpool_limits(1, "blas"), ThreadPoolExecutor(os.cpu_count()) as pool:
         return dict(zip(targets, pool.map(outcome, targets), strict=True))
 
 

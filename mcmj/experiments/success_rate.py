@@ -61,6 +61,12 @@ class Result:
     period_errors: dict[str, Array]
 
     @property
+    def best_seed(self) -> int:
+        """Seed of the body whose worst orbit error over the tasks is the smallest."""
+        worst = np.max(list(self.orbit_errors.values()), axis=0)
+        return self.config.first_seed + int(worst.argmin())
+
+    @property
     def metrics(self) -> dict[str, object]:
         """Rates with their 95 % Wilson intervals, and median errors."""
         successes = {n: e < self.config.threshold for n, e in self.orbit_errors.items()}
@@ -73,6 +79,7 @@ class Result:
             }
             for name, good in successes.items()
         }
+        table["best_seed"] = self.best_seed
         table["all_tasks"] = _rate(np.logical_and.reduce(list(successes.values())))
         return table
 
