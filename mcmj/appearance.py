@@ -11,6 +11,7 @@ INPUT_COLOUR = (0.20, 0.70, 0.20)
 FEEDBACK_COLOURS = ((0.55, 0.20, 0.70), (0.10, 0.70, 0.75), (0.95, 0.60, 0.10), (0.90, 0.40, 0.65))
 PLAIN_COLOUR = (0.45, 0.45, 0.45)
 SPRING_COLOUR = (0.55, 0.58, 0.62)
+CAMERA_ANGLE = 30.0  # degrees; narrow: nodes far out are seen from above too
 MARGIN = 0.12  # of the body's larger side, around it
 
 
@@ -45,11 +46,10 @@ def add_appearance(root: ET.Element, body: Body) -> None:
     on white."""
     cx, cy, width, height = frame(body)
     extent = max(width, height)
+    distance = extent / 2 / np.tan(np.radians(CAMERA_ANGLE / 2))
     ET.SubElement(root, "statistic", center=f"{cx:g} {cy:g} 0", extent=f"{extent:g}")
     visual = ET.SubElement(root, "visual")
-    ET.SubElement(
-        visual, "global", azimuth="90", elevation="-90", orthographic="true", fovy=f"{extent:g}"
-    )
+    ET.SubElement(visual, "global", azimuth="90", elevation="-90", fovy=f"{CAMERA_ANGLE:g}")
     ET.SubElement(visual, "headlight", ambient=".7 .7 .7", diffuse=".3 .3 .3", specular="0 0 0")
     ET.SubElement(visual, "quality", shadowsize="0", offsamples="0", numslices="12", numstacks="6")
     ET.SubElement(
@@ -64,7 +64,6 @@ def add_appearance(root: ET.Element, body: Body) -> None:
         world,
         "camera",
         name="top",
-        pos=f"{cx:g} {cy:g} {2 * extent:g}",
-        projection="orthographic",
-        fovy=f"{height:g}",
+        pos=f"{cx:.9g} {cy:.9g} {distance:.9g}",
+        fovy=f"{CAMERA_ANGLE:g}",
     )

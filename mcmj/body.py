@@ -180,14 +180,14 @@ def _check_connected(springs: npt.NDArray[np.int64], n: int) -> None:
 def _checked_fixed(value: object, positions: Array) -> npt.NDArray[np.bool_]:
     n = len(positions)
     if value is None:
-        fixed = np.zeros(n, dtype=np.bool_)
-        fixed[[positions[:, 0].argmin(), positions[:, 0].argmax()]] = True
-        return fixed
-    array = np.asarray(value)
-    if array.dtype != np.bool_ or array.shape != (n,):
-        raise InvalidArgumentError(
-            "fixed", f"{n} booleans", f"{array.dtype} of shape {array.shape}"
-        )
+        array = np.zeros(n, dtype=np.bool_)
+        array[[positions[:, 0].argmin(), positions[:, 0].argmax()]] = True
+    else:
+        array = np.asarray(value)
+        if array.dtype != np.bool_ or array.shape != (n,):
+            raise InvalidArgumentError(
+                "fixed", f"{n} booleans", f"{array.dtype} of shape {array.shape}"
+            )
     if array.all():
         raise InvalidArgumentError("fixed", "at least one free node", "all nodes fixed")
     return array

@@ -1,6 +1,7 @@
 """MJCF -> Body: read back what `mcmj.mjcf` wrote, to the bit, from a file or a compiled model."""
 
 import json
+import re
 from pathlib import Path
 
 import mujoco
@@ -8,9 +9,11 @@ import numpy as np
 
 from mcmj.body import Body
 from mcmj.errors import BodyFileError, InvalidArgumentError
-from mcmj.laws import TAG
+from mcmj.memory import TAG
 from mcmj.mjcf import READOUT_PREFIX
 from mcmj.validation import Array
+
+_JOINT = re.compile(r"n(\d+)x")
 
 
 def from_mjcf(xml_or_path: str | Path) -> tuple[Body, Array | None]:
@@ -31,8 +34,8 @@ def load_model(xml_or_path: str | Path) -> mujoco.MjModel:
     """
     text = str(xml_or_path)
     inline = text.lstrip().startswith("<")
-    if not inline and not Path(text).is_file():
-        raise BodyFileError(f"no such body file: {text}")
+    if not inline and not _is_file(text):
+        raise BodyFileError(f"no such body file: {text[:200]}")
     try:
         if inline:
             return mujoco.MjModel.from_xml_string(text)
@@ -40,6 +43,13 @@ def load_model(xml_or_path: str | Path) -> mujoco.MjModel:
     except ValueError as error:
         source = "MJCF text" if inline else text
         raise BodyFileError(f"{source}: MuJoCo cannot compile it: {error}") from error
+
+
+def _is_file(path: str) -> bool:
+    try:
+        return Path(path).is_file()
+    except (OSError, ValueError):  # too long for a name, or with a null
+        return False
 
 
 def body_of_model(model: mujoco.MjModel) -> Body:
@@ -59,8 +69,8 @@ def body_of_model(model: mujoco.MjModel) -> Body:
     fixed = owner == 0
     positions = model.body_pos[owner] + model.site_pos[nodes]
     masses = np.where(fixed, 1.0, model.body_mass[owner])
-    if (stored := _numeric(model, "fixed_masses")) is not None:
-        masses[fixed] = stored
+    if (stored := _stored(model, "fixed_masses")) is not None:
+        masses[fixed] = _shaped(stored, (int(fixed.sum()),), "fixed_masses")
     try:
         return Body(
             positions=positions[:, :2],
@@ -84,14 +94,23 @@ def readout_of_model(model: mujoco.MjModel) -> Array | None:
 
 
 def readouts_of_model(model: mujoco.MjModel) -> dict[str, Array]:
-    """The named readouts that `to_mjcf` stored, (L or L + 1, n_outputs) each."""
-    n_outputs = len(_ids(model, mujoco.mjtObj.mjOBJ_ACTUATOR, "fb", model.nu))
-    names = [model.numeric(i).name for i in range(model.nnumeric)]
-    return {
-        name.removeprefix(READOUT_PREFIX): model.numeric(name).data.reshape(-1, n_outputs).copy()
-        for name in names
-        if name.startswith(READOUT_PREFIX)
-    }
+    """The named readouts that `to_mjcf` stored, (L or L + 1, n_outputs) each.
+
+    Raises:
+        BodyFileError: the model is not an mcmj body, or a readout does not fit it.
+    """
+    names = [name for name in _text_names(model) if name.startswith(READOUT_PREFIX)]
+    if not names:
+        return {}
+    body = body_of_model(model)
+    readouts = {}
+    for name in names:
+        values = _stored(model, name)
+        assert values is not None
+        if values.size not in (body.n_outputs * (body.n_springs + k) for k in (0, 1)):
+            raise BodyFileError(f"{name}: {values.size} weights do not fit {body!r}")
+        readouts[name.removeprefix(READOUT_PREFIX)] = values.reshape(-1, body.n_outputs)
+    return readouts
 
 
 def provenance_of_model(model: mujoco.MjModel) -> dict[str, object] | None:
@@ -146,22 +165,46 @@ def _spring_parameters(model: mujoco.MjModel, springs: np.ndarray) -> dict[str, 
 def _weights(model: mujoco.MjModel, prefix: str, fixed: np.ndarray) -> Array:
     """Weights (N, channels) from the joint coefficients of the channels' fixed tendons."""
     channels = _ids(model, mujoco.mjtObj.mjOBJ_TENDON, prefix, model.ntendon)
+    driven = _ids(model, mujoco.mjtObj.mjOBJ_ACTUATOR, prefix, model.nu)
+    if len(driven) != len(channels):
+        raise BodyFileError(
+            f"{len(channels)} tendons {prefix}0, {prefix}1, .. but {len(driven)} such actuators"
+        )
     weights = np.zeros((len(fixed), len(channels)))
     for c, tendon in enumerate(channels):
         for wrap in range(
             model.tendon_adr[tendon], model.tendon_adr[tendon] + model.tendon_num[tendon]
         ):
-            joint = model.joint(model.wrap_objid[wrap]).name
-            weights[int(joint[1:-1]), c] = model.wrap_prm[wrap]
-    stored = _numeric(model, f"fixed_w_{prefix}")
+            joint = _JOINT.fullmatch(model.joint(model.wrap_objid[wrap]).name)
+            if model.wrap_type[wrap] != mujoco.mjtWrap.mjWRAP_JOINT or joint is None:
+                raise BodyFileError(f"tendon {prefix}{c} does not push nodes horizontally")
+            weights[int(joint[1]), c] = model.wrap_prm[wrap]
+    stored = _stored(model, f"fixed_w_{prefix}")
     if stored is not None:
-        weights[fixed] = stored.reshape(-1, len(channels))
+        weights[fixed] = _shaped(stored, (int(fixed.sum()), len(channels)), prefix)
     return weights
 
 
-def _numeric(model: mujoco.MjModel, name: str) -> Array | None:
-    index = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_NUMERIC, name)
-    return None if index < 0 else model.numeric(index).data.copy()
+def _stored(model: mujoco.MjModel, name: str) -> Array | None:
+    """Numbers that `to_mjcf` stored as text."""
+    text = _text(model, name)
+    if text is None:
+        return None
+    try:
+        return np.array([float(word) for word in text.split()])
+    except ValueError as error:
+        raise BodyFileError(f"{name}: expected numbers ({error})") from error
+
+
+def _shaped(values: Array, shape: tuple[int, ...], name: str) -> Array:
+    if values.size != np.prod(shape):
+        raise BodyFileError(f"{name}: expected {np.prod(shape)} numbers, got {values.size}")
+    return values.reshape(shape)
+
+
+def _text_names(model: mujoco.MjModel) -> list[str]:
+    names = [mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_TEXT, i) for i in range(model.ntext)]
+    return [name for name in names if name]
 
 
 def _text(model: mujoco.MjModel, name: str) -> str | None:

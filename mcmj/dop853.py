@@ -18,7 +18,8 @@ Signal = Callable[[float], Array]
 Push = Callable[[float, Array], Array]
 
 RTOL = 1e-12
-EVALUATIONS_PER_STEP = 5000  # give up beyond this many evaluations in one control step
+EVALUATIONS_PER_STEP = 5000  # give up beyond this many in one control step,
+EVALUATIONS_PER_SECOND = 1_000_000  # and this many more in a second
 ATOL_SHARE = 1e-3  # absolute tolerance, over the relative one, in units of 1 m and 1 m/s
 
 
@@ -145,13 +146,14 @@ def _solve(
 ) -> tuple[Array, float | None]:
     """States (T + 1, 4 N) at times (T + 1,), and a good first step for the next piece."""
 
-    budget = EVALUATIONS_PER_STEP * (len(times) - 1)
+    duration = times[-1] - times[0]
+    budget = EVALUATIONS_PER_STEP * (len(times) - 1) + EVALUATIONS_PER_SECOND * duration
 
     def rhs(t: float, state: Array) -> Array:
         nonlocal budget
         budget -= 1
         if budget < 0 or not np.isfinite(state).all():
-            raise _divergence(float(t))
+            raise _divergence(float(t), body, state)
         positions, velocities = _split(body, state)
         change = accelerations(body, positions, velocities, push(t, positions))
         return np.concatenate([np.where(body.fixed[:, None], 0.0, velocities), change], axis=None)
@@ -169,14 +171,17 @@ def _solve(
             first_step=None if first_step is None else min(first_step, duration),
         )
     if not solution.success:
-        raise _divergence(float(solution.t[-1]))
+        raise _divergence(float(solution.t[-1]), body, solution.y[:, -1])
     states = solution.y.T if len(times) > 2 else solution.y.T[[0, -1]]
     return states, float(duration) if len(times) == 2 and len(solution.t) == 2 else None
 
 
-def _divergence(time: float) -> DivergenceError:
+def _divergence(time: float, body: Body, state: Array) -> DivergenceError:
+    speed = np.abs(np.nan_to_num(_split(body, state)[1], nan=np.inf)).max(axis=1)
     return DivergenceError(
-        f"dop853: the body blew up, or is too stiff for an explicit method, at t = {time:.6g} s",
+        "dop853: the body blew up, or is too stiff for an explicit method, at "
+        f"t = {time:.6g} s at node {int(speed.argmax())} (adaptive step); try smaller forces, "
+        "speeds and readout weights, or MuJoCo's 'discrete' for stiff dampers",
         time=time,
         steps_done=0,
     )

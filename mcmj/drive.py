@@ -88,7 +88,7 @@ def _common_length(steps: int | None, arrays: dict[str, Array | None]) -> int:
                 "steps", "a number of steps, or inputs, offset or forces over time", None
             )
         steps = next(iter(lengths.values()))
-    require_count("steps", steps, 0)
+    require_count("steps", steps, 1)
     for name, length in lengths.items():
         if length != steps:
             raise InvalidArgumentError(name, f"{steps} rows, one a step", length)

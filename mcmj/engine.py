@@ -11,7 +11,8 @@ from mcmj import laws
 from mcmj.body import Body
 from mcmj.bodyfile import load_model
 from mcmj.drive import Drive
-from mcmj.errors import DivergenceError
+from mcmj.errors import DivergenceError, InvalidArgumentError
+from mcmj.leapfrog import LEAPFROG, node_velocities
 from mcmj.mjcf import to_mjcf
 from mcmj.quiet import quiet_warnings
 from mcmj.spring_laws import SpringLaw, spring_law
@@ -48,27 +49,31 @@ class Engine:
             ("substeps", substeps, 1),
         ):
             require_count(name, value, low)
+        if feedback_delay and integrator == "RK4":
+            raise InvalidArgumentError(
+                "feedback_delay", "0 under RK4, whose inner stages MuJoCo's delayed sensors keep",
+                feedback_delay,
+            )  # fmt: skip
         self.body, self.timestep, self.integrator = body, timestep, integrator
         self.substeps = substeps
-        self.model = load_model(
-            to_mjcf(
-                body,
-                timestep=timestep / substeps,
-                integrator=integrator,
-                w_out=np.zeros((body.n_springs + 1, body.n_outputs)),
-                springs=springs,
-                feedback_delay=feedback_delay * timestep,
-                control_period=timestep if substeps > 1 else 0.0,
-            )
+        self._physics_step = timestep / substeps
+        xml = to_mjcf(
+            body,
+            timestep=self._physics_step,
+            integrator=integrator,
+            w_out=np.zeros((body.n_springs + 1, body.n_outputs)),
+            springs=springs,
+            feedback_delay=feedback_delay * timestep,
+            control_period=timestep if substeps > 1 else 0.0,
         )
+        self._law = law = spring_law(springs)  # keeps the compiled function alive
+        self._callbacks = {"springs": law is not None, "leapfrog": integrator == LEAPFROG}
+        laws.install(**self._callbacks)  # first: MuJoCo's compiler calls them too
+        self.model = load_model(xml)
         if substeps > 1:  # the first sample at t = 0: MJCF takes no phase beyond a period
             self.model.sensor_interval[: body.n_springs, 1] -= timestep
-        law = spring_law(springs)
-        self._uses_law = law is not None
         if law is not None:
             self.model.tendon_user[: body.n_springs, 1] = law.address_as_double
-        self._law = law  # keeps the compiled function alive
-        laws.install(springs=self._uses_law)
         self._batch = Batch(self.model, copies, threads)
         self._x_dofs = 2 * np.arange(len(body.free))  # joints are n<i>x, n<i>y in node order
         self.steps_done = 0
@@ -100,13 +105,16 @@ class Engine:
         """Positions and velocities (copies, N, 2) now."""
         return State(
             positions=self._positions(self._batch.bind("qpos")),
-            velocities=self._velocities(self._batch.bind("qvel")),
+            velocities=self._velocities(self._joint_velocities()),
             time=self.steps_done * self.timestep,
         )
 
     def set_state(self, positions: object, velocities: object) -> None:
         """Positions and velocities (N, 2) for all copies, or (copies, N, 2); None: as they are."""
         free = self.body.free
+        if self.integrator == LEAPFROG:  # starts anew
+            self._batch.bind("qvel")[:] = self._joint_velocities()
+            self._batch.bind("userdata")[:] = 0.0
         for name, value, field, origin in (
             ("positions", positions, "qpos", self.body.positions),
             ("velocities", velocities, "qvel", 0.0),
@@ -129,7 +137,8 @@ class Engine:
     def current_lengths(self) -> Array:
         """Spring lengths (copies, L) [m] at the current state."""
         lengths = self._batch.bind("sensordata")
-        self._batch.forward(stage=_POSITION_STAGE)
+        with quiet_warnings():
+            self._batch.forward(stage=_POSITION_STAGE)
         return lengths[:, -self.body.n_springs :].copy()
 
     def _positions(self, qpos: Array) -> Array:
@@ -139,7 +148,13 @@ class Engine:
         positions[..., self.body.free, :] += qpos.reshape(*qpos.shape[:-1], -1, 2)
         return positions
 
+    def _joint_velocities(self) -> Array:
+        """Best estimates (copies, nv) of the velocities now [m/s]."""
+        qvel, userdata = self._batch.bind("qvel"), self._batch.bind("userdata")
+        return node_velocities(qvel, userdata, self._physics_step)
+
     def _velocities(self, qvel: Array) -> Array:
+        """Node velocities (..., N, 2) from joint velocities (..., nv)."""
         velocities = np.zeros((*qvel.shape[:-1], self.body.n_nodes, 2))
         velocities[..., self.body.free, :] = qvel.reshape(*qvel.shape[:-1], -1, 2)
         return velocities
@@ -148,7 +163,7 @@ class Engine:
 
     def prepare(self, drive: Drive) -> None:
         """Set gates and clear old inputs before the first chunk of a drive."""
-        laws.install(springs=self._uses_law)
+        laws.install(**self._callbacks)
         if self.body.n_outputs:
             gates = self._batch.expand("actuator_biasprm")[:, self.body.n_inputs :, 0]
             gates[:] = drive.gate
@@ -162,10 +177,12 @@ class Engine:
             DivergenceError: a copy blew up.
         """
         batch, steps = self._batch, (stop - start) * self.substeps
-        qpos, qvel = batch.bind("qpos").copy(), batch.bind("qvel").copy()
+        qpos, qvel = batch.bind("qpos").copy(), self._joint_velocities().copy()
         control, spec = self._control(drive, start, stop)
         items = {"positions": "qpos", "velocities": "qvel", "lengths": "sensordata"}
         wanted = [items[name] for name in record] or [_TIME]
+        if "velocities" in record:
+            wanted.append("userdata")
         time = batch.bind("time").copy()
         with quiet_warnings():
             rows = batch.rollout(steps, control, spec, wanted)
@@ -180,7 +197,8 @@ class Engine:
             elif name == "positions":
                 recorded[name] = self._positions(_shifted(qpos, samples, self.substeps))
             else:
-                recorded[name] = self._velocities(_shifted(qvel, samples, self.substeps))
+                after = node_velocities(samples, rows["userdata"], self._physics_step)
+                recorded[name] = self._velocities(_shifted(qvel, after, self.substeps))
         return recorded
 
     def _control(self, drive: Drive, start: int, stop: int) -> tuple[Array | None, int]:
@@ -209,14 +227,15 @@ class Engine:
     def _check_alive(self, time_before: Array, steps: int) -> None:
         """Raise if a copy stopped early or holds a number that is not finite."""
         time = self._batch.bind("time")
-        step = self.timestep / self.substeps
+        step = self._physics_step
         done = np.rint((time - time_before) / step).astype(int)
         velocities = self._velocities(self._batch.bind("qvel"))
         dead = np.flatnonzero((done < steps) | ~np.isfinite(velocities).all(axis=(1, 2)))
         if not dead.size:
             return
         copy = dead[0]
-        speed = np.linalg.norm(np.nan_to_num(velocities[copy], nan=np.inf), axis=-1)
+        self.steps_done += int(done[copy]) // self.substeps
+        speed = np.hypot(*np.nan_to_num(velocities[copy], nan=np.inf).T)  # no overflow
         node = int(speed.argmax())
         which = f"copy {copy}: " if self.copies > 1 else ""
         raise DivergenceError(

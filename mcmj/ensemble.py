@@ -7,6 +7,7 @@ from mcmj.engine import Engine
 from mcmj.mjcf import DEFAULT_INTEGRATOR
 from mcmj.simulation import Simulation
 from mcmj.spring_laws import SpringLaw
+from mcmj.steplimit import warn_if_unstable
 from mcmj.validation import Array, as_array
 
 
@@ -47,6 +48,7 @@ class Ensemble(Simulation):
             feedback_delay=feedback_delay,
             substeps=substeps,
         )
+        warn_if_unstable(body, timestep, substeps, integrator, springs)
         self._copies = copies
         self.set_readout(w_out)
 

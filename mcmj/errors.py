@@ -40,6 +40,18 @@ class DivergenceError(McmjError, ArithmeticError):
         self.steps_done = steps_done
         super().__init__(message)
 
+    def after(self, steps: int) -> "DivergenceError":
+        """The same error in a rollout that had done so many steps before."""
+        return DivergenceError(str(self), self.time, self.steps_done + steps)
+
 
 class OutputError(McmjError, OSError):
     """A folder or file that cannot be written."""
+
+
+class McmjWarning(UserWarning):
+    """Base class of every warning that mcmj gives."""
+
+
+class StabilityWarning(McmjWarning):
+    """A simulation that will blow up: its step is above the integrator's stability limit."""

@@ -47,10 +47,13 @@ def period(outputs: Array, timestep: float, guess: float) -> float:
         guess: expected period [s]; the true one is looked for within 20 %.
 
     Raises:
-        InvalidArgumentError: outputs shorter than 1.5 periods of the guess.
+        InvalidArgumentError: outputs at rest, or shorter than 1.5 periods of the guess.
     """
     require_number("timestep", timestep, 0.0, open_low=True)
+    require_number("guess", guess, 0.0, open_low=True)
     values = as_array("outputs", outputs, (None, None))
+    if (np.ptp(values, axis=0) <= 1e-9 * (1.0 + np.abs(values).max())).all():
+        raise InvalidArgumentError("outputs", "something that moves", "outputs at rest")
     if len(values) * timestep < PERIODS_NEEDED * guess:
         raise InvalidArgumentError(
             "outputs",

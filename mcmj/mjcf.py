@@ -17,11 +17,12 @@ import numpy.typing as npt
 from mcmj.appearance import add_appearance, node_style
 from mcmj.body import Body
 from mcmj.errors import InvalidArgumentError, UnknownNameError
-from mcmj.laws import TAG
+from mcmj.leapfrog import LEAPFROG, userdata_size
+from mcmj.memory import TAG
 from mcmj.spring_laws import SpringLaw, spring_law
 from mcmj.validation import Array, as_array, require_number
 
-INTEGRATORS = ("Euler", "RK4", "implicit", "implicitfast", "discrete")
+INTEGRATORS = ("Euler", "RK4", "implicit", "implicitfast", "discrete", LEAPFROG)
 DEFAULT_INTEGRATOR = "Euler"
 READOUT_PREFIX = "readout/"
 
@@ -43,7 +44,8 @@ def to_mjcf(
     Args:
         body: the body.
         timestep: physics step [s].
-        integrator: one of MuJoCo's names.
+        integrator: one of MuJoCo's names, or "leapfrog": Euler unless mcmj's callbacks are
+            installed, see mcmj.leapfrog.
         w_out: readout (L, n_outputs), or (L + 1, n_outputs) with a bias in the last row. With
             one the loop is closed wherever mcmj's callbacks are installed; else it is open.
         readouts: more readouts by name, kept in the file; see `readouts_of_model`.
@@ -61,10 +63,12 @@ def to_mjcf(
     if integrator not in INTEGRATORS:
         raise UnknownNameError("integrator", integrator, INTEGRATORS)
     root = ET.Element("mujoco", model="mcmj body")
-    _add_options(root, timestep, integrator)
+    _add_options(root, body, timestep, integrator)
     add_appearance(root, body)
+    if readouts and body.n_outputs == 0:
+        raise InvalidArgumentError("readouts", "none for a body without outputs", list(readouts))
     checked = {name: checked_readout(body, w, name) for name, w in (readouts or {}).items()}
-    _add_custom(root, body, checked, spring_law(springs), provenance)
+    _add_custom(root, body, checked, integrator, spring_law(springs), provenance)
     _add_nodes(root, body)
     tendons = ET.SubElement(root, "tendon")
     _add_springs(tendons, body, spring_law(springs))
@@ -96,10 +100,20 @@ def numbers(values: npt.ArrayLike) -> str:
     return " ".join(repr(float(v)) for v in np.asarray(values).ravel())
 
 
-def _add_options(root: ET.Element, timestep: float, integrator: str) -> None:
+def _json(provenance: Mapping[str, object]) -> str:
+    try:
+        return json.dumps(provenance)
+    except (TypeError, ValueError) as error:
+        raise InvalidArgumentError("provenance", "JSON values", error) from error
+
+
+def _add_options(root: ET.Element, body: Body, timestep: float, integrator: str) -> None:
+    name = "Euler" if integrator == LEAPFROG else integrator
     option = ET.SubElement(
-        root, "option", timestep=numbers(timestep), gravity="0 0 0", integrator=integrator
+        root, "option", timestep=numbers(timestep), gravity="0 0 0", integrator=name
     )
+    if integrator == LEAPFROG:
+        ET.SubElement(root, "size", nuserdata=str(userdata_size(2 * len(body.free))))
     # no contacts, limits or equalities: skip the whole constraint machinery; and keep a state
     # that blew up for the error message instead of resetting it silently
     ET.SubElement(option, "flag", constraint="disable", contact="disable", autoreset="disable")
@@ -109,22 +123,25 @@ def _add_custom(
     root: ET.Element,
     body: Body,
     readouts: Mapping[str, Array],
+    integrator: str,
     law: SpringLaw | None,
     provenance: Mapping[str, object] | None,
 ) -> None:
-    """What MJCF has no place for: masses and weights of fixed nodes, more readouts, provenance."""
-    custom = ET.Element("custom")
+    """What MJCF has no place for: masses and weights of fixed nodes, more readouts, leapfrog, .."""
+    custom = ET.Element("custom")  # as text: a numeric takes 500 numbers at most
+    if integrator == LEAPFROG:
+        ET.SubElement(custom, "numeric", name=LEAPFROG, data=numbers(TAG))
     extras = {"fixed_masses": body.masses, "fixed_w_in": body.w_in, "fixed_w_fb": body.w_fb}
     for name, array in extras.items():
         values = array[body.fixed]
         if values.size and (values != (1.0 if name == "fixed_masses" else 0.0)).any():
-            ET.SubElement(custom, "numeric", name=name, data=numbers(values))
+            ET.SubElement(custom, "text", name=name, data=numbers(values))
     for name, readout in readouts.items():
-        ET.SubElement(custom, "numeric", name=READOUT_PREFIX + name, data=numbers(readout))
+        ET.SubElement(custom, "text", name=READOUT_PREFIX + name, data=numbers(readout))
     if law is not None:
         ET.SubElement(custom, "text", name="spring_law", data=law.name)
     if provenance is not None:
-        ET.SubElement(custom, "text", name="provenance", data=json.dumps(provenance))
+        ET.SubElement(custom, "text", name="provenance", data=_json(provenance))
     if len(custom):
         root.append(custom)
 

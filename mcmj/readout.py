@@ -49,8 +49,8 @@ class Regression:
         self._factor: Array | None = None
         self._n_lengths = 0
         self._rows = 0
-        self._target_sum = np.zeros(0)
-        self._target_squares = np.zeros(0)
+        self._mean = np.zeros(0)  # of the targets, and their summed squares about it
+        self._scatter = 0.0
 
     def add(self, lengths: Array, targets: Array) -> None:
         """Fold in samples: lengths (M, L) and targets (M, n_outputs).
@@ -65,15 +65,25 @@ class Regression:
         if self._factor is None:
             self._n_lengths = x.shape[1]
             self._factor = np.zeros((0, block.shape[1]))
-            self._target_sum = np.zeros(y.shape[1])
-            self._target_squares = np.zeros(y.shape[1])
-        elif block.shape[1] != self._factor.shape[1] or x.shape[1] != self._n_lengths:
+            self._mean = np.zeros(y.shape[1])
+        elif x.shape[1] != self._n_lengths:
             raise InvalidArgumentError("lengths", f"{self._n_lengths} columns", x.shape[1])
+        elif y.shape[1] != len(self._mean):
+            raise InvalidArgumentError("targets", f"{len(self._mean)} columns", y.shape[1])
         stacked = np.vstack([self._factor, block])
         self._factor = np.asarray(np.linalg.qr(stacked, mode="r"))
-        self._rows += len(x)
-        self._target_sum += y.sum(axis=0)
-        self._target_squares += (y**2).sum(axis=0)
+        self._count(y)
+
+    def _count(self, y: Array) -> None:
+        """Merge mean and scatter of new targets (Chan et al. 1979): large means do no harm."""
+        before, new = self._rows, len(y)
+        if new == 0:
+            return
+        mean = y.mean(axis=0)
+        shift = mean - self._mean
+        self._rows = before + new
+        self._scatter += ((y - mean) ** 2).sum() + (shift**2).sum() * before * new / self._rows
+        self._mean = self._mean + shift * new / self._rows
 
     def solve(self, ridge: float = 0.0) -> Fit:
         """The readout for a ridge parameter >= 0.
@@ -91,11 +101,12 @@ class Regression:
         top, reached = self._factor[:, :n_unknowns], self._factor[:, n_unknowns:]
         weights, values = self._minimise(top, reached, ridge)
         residual = reached - top @ weights
-        variance = self._target_squares / self._rows - (self._target_sum / self._rows) ** 2
         rank = int((values > values[0] * max(self._rows, n_unknowns) * np.finfo(float).eps).sum())
         return Fit(
             w_out=np.roll(weights, -1, axis=0) if self._bias else weights,
-            train_nrmse=float(np.sqrt((residual**2).sum() / self._rows / variance.sum())),
+            train_nrmse=(
+                float(np.sqrt((residual**2).sum() / self._scatter)) if self._scatter > 0 else np.inf
+            ),
             rank=rank,
             condition_number=float(values[0] / values[-1]) if values[-1] > 0 else np.inf,
             rows=self._rows,
@@ -106,8 +117,8 @@ class Regression:
         u, values, vt = svd(top, full_matrices=False)
         cut = values[0] * max(self._rows, top.shape[1]) * np.finfo(float).eps
         if ridge == 0.0:
-            inverse = np.where(values > cut, 1.0 / np.maximum(values, cut), 0.0)
-            return vt.T @ (inverse[:, None] * (u.T @ reached)), values
+            kept = values > cut
+            return vt[kept].T @ ((u.T @ reached)[kept] / values[kept, None]), values
         penalty = np.sqrt(ridge) * np.eye(top.shape[1])
         if self._bias:
             penalty[0, 0] = 0.0

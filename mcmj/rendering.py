@@ -53,8 +53,6 @@ def body_frames(body: Body, positions: Array, *, scale: float, size: int = SIZE)
         RenderingUnavailableError: no OpenGL context can be made.
     """
     model = load_model(to_mjcf(body))
-    _, _, width, height = frame(body)
-    model.camera("top").fovy[0] = max(width, height)
     data = mujoco.MjData(model)
     extension = spring_lengths(positions, body.springs) - body.rest_lengths
     strain = extension / np.abs(extension).max() if extension.any() else extension

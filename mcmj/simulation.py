@@ -16,9 +16,10 @@ import numpy as np
 from mcmj.body import Body
 from mcmj.drive import Drive, check_drive
 from mcmj.engine import Engine
-from mcmj.errors import UnknownNameError
+from mcmj.errors import DivergenceError, UnknownNameError
 from mcmj.mjcf import DEFAULT_INTEGRATOR, checked_readout
 from mcmj.spring_laws import SpringLaw
+from mcmj.steplimit import warn_if_unstable
 from mcmj.trajectory import RECORDABLE, State, Trajectory, join
 from mcmj.validation import Array, as_array, require_count
 
@@ -34,7 +35,8 @@ class Simulation:
         body: the body.
         w_out: readout (L, n_outputs), or (L + 1, n_outputs) with a bias in the last row.
         timestep: control step [s]: inputs, feedback and records go at this pace.
-        integrator: one of MuJoCo's: Euler, RK4, implicit, implicitfast, discrete.
+        integrator: one of MuJoCo's: Euler, RK4, implicit, implicitfast, discrete; or leapfrog,
+            of second order at Euler's cost (mcmj.leapfrog).
         springs: "native" (MuJoCo's polynomial), "cubic" or "tansig" (compiled callback), or
             your own SpringLaw.
         feedback_delay: number of control steps between a length and the force it feeds back;
@@ -68,6 +70,7 @@ class Simulation:
             feedback_delay=feedback_delay,
             substeps=substeps,
         )
+        warn_if_unstable(body, timestep, substeps, integrator, springs)
         self.set_readout(w_out)
 
     @property
@@ -211,10 +214,14 @@ class Simulation:
         self, drive: Drive, record: frozenset[str], hook: Hook | None, chunk: int
     ) -> Iterator[Trajectory]:
         self._engine.prepare(drive)
-        for start in range(0, max(drive.steps, 1), chunk):
+        for start in range(0, drive.steps, chunk):
             stop = min(start + chunk, drive.steps)
             now = _with_hook(drive, hook, start, self) if hook else drive
-            yield self._run(now, record, start, stop)
+            try:
+                chunk_run = self._run(now, record, start, stop)
+            except DivergenceError as error:
+                raise error.after(start) from None
+            yield chunk_run
 
     def _run(self, drive: Drive, record: frozenset[str], start: int, stop: int) -> Trajectory:
         done = self._engine.steps_done
@@ -239,7 +246,9 @@ class Simulation:
 def _with_hook(drive: Drive, hook: Hook, step: int, simulation: Simulation) -> Drive:
     """The drive with the hook's forces for this one step added."""
     lengths = simulation._public(simulation._engine.current_lengths())
-    forces = as_array("hook's forces", hook(simulation.time, lengths), (simulation.body.n_nodes,))
+    pushed = hook(simulation.time, lengths)
+    forces = as_array("hook's forces", pushed, (simulation.body.n_nodes,))[None]
     if drive.forces is not None:
-        forces = forces + drive.forces[..., min(step, drive.forces.shape[-2] - 1), :]
-    return replace(drive, forces=np.atleast_2d(forces))
+        row = min(step, drive.forces.shape[-2] - 1)
+        forces = forces + drive.forces[..., row : row + 1, :]
+    return replace(drive, forces=forces)

@@ -5,14 +5,14 @@ import json
 import os
 import platform
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from mcmj.errors import OutputError
+from mcmj.errors import InvalidArgumentError, OutputError
 
 _PACKAGES = ("mcmj", "mujoco", "numpy", "scipy", "numba")
 
@@ -60,7 +60,8 @@ def whole_file(path: str | Path) -> Iterator[Path]:
     except OSError as error:
         raise OutputError(f"cannot write {final}: {error.strerror or error}") from error
     finally:
-        temporary.unlink(missing_ok=True)
+        with suppress(OSError):
+            temporary.unlink(missing_ok=True)
 
 
 def write_text(path: str | Path, text: str) -> None:
@@ -87,6 +88,9 @@ def write_arrays(
     path: str | Path, arrays: Mapping[str, np.ndarray], config: object, seed: int
 ) -> None:
     """An NPZ file of arrays, with config, seed and versions as JSON text in `provenance`."""
+    for name, array in arrays.items():
+        if np.asarray(array).dtype.hasobject:
+            raise InvalidArgumentError(f"arrays[{name!r}]", "numbers, not Python objects", array)
     account = {"config": plain(config), "seed": seed, "versions": versions()}
     with whole_file(path) as temporary, temporary.open("wb") as file:
         contents: dict[str, Any] = {"provenance": np.array(json.dumps(account)), **arrays}

@@ -3,6 +3,7 @@
 import ctypes
 import functools
 from collections.abc import Sequence
+from typing import Any
 
 import mujoco
 from mujoco.introspect import ast_nodes, enums, structs
@@ -38,6 +39,14 @@ def word_offsets(struct: str, names: Sequence[str]) -> dict[str, int]:
             raise McmjError(f"{struct}.{name} is not aligned to 8 bytes (offset {offset})")
         offsets[name] = offset // 8
     return offsets
+
+
+def byte_offset(struct: str, path: str) -> int:
+    """Offset in bytes of a field of mjModel or mjData, "opt.timestep" say."""
+    name, _, inner = path.partition(".")
+    outer: Any = _verified_layout(struct)
+    offset = getattr(outer, name).offset
+    return offset + getattr(dict(outer._fields_)[name], inner).offset if inner else offset
 
 
 @functools.cache

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from mcmj.errors import InvalidArgumentError
 from mcmj.readout import Fit, Regression
 from mcmj.simulation import CHUNK, Simulation
 from mcmj.streams import stream
@@ -36,7 +37,11 @@ class Teaching:
 
     def __post_init__(self) -> None:
         require_number("duration", self.duration, 0.0, open_low=True)
-        require_number("washout", self.washout, 0.0, self.duration)
+        require_number("washout", self.washout, 0.0)
+        if self.washout >= self.duration:
+            raise InvalidArgumentError(
+                "washout", f"less than the duration of {self.duration:g} s", self.washout
+            )
         for name in ("noise", "length_noise", "ridge_per_row"):
             require_number(name, getattr(self, name), 0.0)
 

@@ -21,6 +21,9 @@ class State:
         time: [s].
         previous_lengths: (L,) spring lengths one step earlier [m] (toolbox scheme only).
         pending_output: (n_outputs,) output still to be fed back (toolbox scheme only).
+        history: (N, 7), the compiled leapfrog only: `velocities` again, the velocities that
+            dampers see next and those half a step back [m/s], the last push [N]. Whoever
+            changes `velocities` makes it void: the scheme then starts anew from them.
     """
 
     positions: Array
@@ -28,6 +31,7 @@ class State:
     time: float = 0.0
     previous_lengths: Array | None = None
     pending_output: Array | None = None
+    history: Array | None = None
 
 
 @dataclass(frozen=True)

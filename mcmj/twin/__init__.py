@@ -1,4 +1,5 @@
-"""Compiled twins of MuJoCo's Euler and RK4, and the authors' scheme, for spring networks.
+"""Compiled twins of MuJoCo's Euler and RK4, of the leapfrog, and of the authors' scheme.
 
-An independent reference for tests, and the fast way to screen bodies by the thousand.
+Of spring networks: an independent reference for tests, and the fast way to screen bodies by
+the thousand.
 """

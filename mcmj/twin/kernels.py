@@ -18,8 +18,11 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
+from mcmj.twin.leapfrog import advance_leapfrog
+from mcmj.twin.rows import copy, load_history, load_rows, store_history, store_rows
 from mcmj.twin.stepping import (
     COMPILE,
+    LEAPFROG,
     RK4,
     begin_rk4,
     held_step,
@@ -158,23 +161,6 @@ def advance_rk4(stage, rows, start, slope, force, push, mobility, step, nodes):
 
 
 @njit(**COMPILE)
-def load_rows(rows, positions, velocities, mobility):
-    """Rows from arrays (N, 2); a fixed node has no velocity, whatever it was given."""
-    for i in range(len(positions)):
-        moves = 1.0 if mobility[i] > 0.0 else 0.0
-        rows[4 * i], rows[4 * i + 1] = positions[i, 0], positions[i, 1]
-        rows[4 * i + 2], rows[4 * i + 3] = moves * velocities[i, 0], moves * velocities[i, 1]
-
-
-@njit(**COMPILE)
-def store_rows(rows, positions, velocities):
-    """Arrays (N, 2) from rows."""
-    for i in range(len(positions)):
-        positions[i, 0], positions[i, 1] = rows[4 * i], rows[4 * i + 1]
-        velocities[i, 0], velocities[i, 1] = rows[4 * i + 2], rows[4 * i + 3]
-
-
-@njit(**COMPILE)
 def shared(values, b):
     """Body b's part of an array whose first axis may be shared (size 1)."""
     return values[min(b, values.shape[0] - 1)]
@@ -193,13 +179,16 @@ def integrate_body(b, bodies, schedule, state, record, method, step, steps):
     keep_lengths, keep_outputs = record.lengths.shape[1] > 0, record.outputs.shape[1] > 0
     rows, start, slope = np.zeros(4 * room), np.zeros(4 * room), np.zeros(4 * room)
     force, push, pulls = np.zeros(2 * room), np.zeros(2 * room), np.zeros(8 * blocks)
+    half, before, older = np.zeros(2 * room), np.zeros(2 * room), np.zeros(2 * room)
     n_outputs, values = last.size, np.zeros(channels.size // room)
     feedback = values.size - n_outputs  # first channel of feedback
     stages, shift, toolbox = method_constants(method)
     per_step = 1.0 / step
-    total = 0.0
+    share, total = 1.0, 0.0
 
-    load_rows(rows, state.positions[b], state.velocities[b], mobility)
+    load_rows(rows, state.positions[b], state.velocities[b], mobility, 1, 0)
+    if method == LEAPFROG:
+        share = load_history(state.history[b], rows, half, before, 1, 0)
     done = 0
     while done < steps:
         for stage in range(stages):
@@ -227,12 +216,22 @@ def integrate_body(b, bodies, schedule, state, record, method, step, steps):
                 if stage == 0:
                     begin_rk4(rows, start, slope)
                 total = advance_rk4(stage, rows, start, slope, force, push, mobility, step, nodes)
+            elif method == LEAPFROG:
+                if done == steps - 1:
+                    copy(before, older)
+                share = 1.0 if done > 0 else share
+                total = advance_leapfrog(
+                    rows, half, force, push, before, mobility, step, share, nodes
+                )
             else:
                 total = advance_held(rows, force, push, mobility, step, shift, nodes)
         if not math.isfinite(total):
             break
         done += 1
-    store_rows(rows, state.positions[b], state.velocities[b])
+    store_rows(rows, state.positions[b], state.velocities[b], 1, 0)
+    if method == LEAPFROG and steps > 0:
+        pushes = before, older
+        store_history(state, b, rows, half, pushes, mobility, step, share, 1, 0)
     return done
 
 

@@ -95,13 +95,18 @@ def to_schedule(drive: Drive, start: int, stop: int) -> Schedule:
 
 
 def to_kernel_state(bodies: Sequence[Body], states: Sequence[State]) -> KernelState:
-    """States of several bodies; without memory, lengths one step ago are the rest lengths."""
+    """States of several bodies.
+
+    Without memory, lengths one step ago are the rest lengths, and the leapfrog starts anew; as
+    it does where the velocities are not those that the history belongs to.
+    """
     nodes = max(body.n_nodes for body in bodies)
     width = max(_round_up(body.n_springs) for body in bodies)
     positions = np.zeros((len(bodies), nodes, 2))
     velocities = np.zeros_like(positions)
     lengths = _aligned((len(bodies), width))
     outputs = np.zeros((len(bodies), bodies[0].n_outputs))
+    history = np.full((len(bodies), nodes, 5), np.nan)
     for b, (body, state) in enumerate(zip(bodies, states, strict=True)):
         positions[b, : body.n_nodes] = state.positions
         velocities[b, : body.n_nodes] = state.velocities
@@ -109,7 +114,10 @@ def to_kernel_state(bodies: Sequence[Body], states: Sequence[State]) -> KernelSt
         lengths[b, : body.n_springs] = body.rest_lengths if before is None else before
         if state.pending_output is not None:
             outputs[b] = state.pending_output
-    return KernelState(positions, velocities, lengths, outputs)
+        past = state.history
+        if past is not None and np.array_equal(past[:, :2], state.velocities):
+            history[b, : body.n_nodes] = past[:, 2:]
+    return KernelState(positions, velocities, lengths, outputs, history)
 
 
 def empty_record(bodies: Sequence[Body], steps: int, *, lengths: bool) -> Record:

@@ -11,8 +11,11 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
+from mcmj.twin.leapfrog import advance_leapfrog_pack
+from mcmj.twin.rows import copy, load_pack, store_pack, store_pack_history
 from mcmj.twin.stepping import (
     COMPILE,
+    LEAPFROG,
     RK4,
     begin_rk4,
     held_step,
@@ -143,33 +146,6 @@ def advance_rk4(stage, rows, start, slope, force, push, mobility, step, nodes, t
 
 
 @njit(**COMPILE)
-def load_pack(state, first, mobility, rows, lengths, springs):
-    """Rows and lengths of the pack's bodies; places past the last body repeat it."""
-    for body in range(4):
-        b = min(first + body, len(state.positions) - 1)
-        for i in range(state.positions.shape[1]):
-            moves = 1.0 if mobility[4 * i + body] > 0.0 else 0.0
-            for axis in range(2):
-                rows[16 * i + 4 * axis + body] = state.positions[b, i, axis]
-                rows[16 * i + 8 + 4 * axis + body] = moves * state.velocities[b, i, axis]
-        for j in range(springs):
-            lengths[4 * j + body] = state.lengths[b, j]
-
-
-@njit(**COMPILE)
-def store_pack(state, first, present, rows, lengths, springs):
-    """Back to the state arrays."""
-    for body in range(present):
-        b = first + body
-        for i in range(state.positions.shape[1]):
-            for axis in range(2):
-                state.positions[b, i, axis] = rows[16 * i + 4 * axis + body]
-                state.velocities[b, i, axis] = rows[16 * i + 8 + 4 * axis + body]
-        for j in range(springs):
-            state.lengths[b, j] = lengths[4 * j + body]
-
-
-@njit(**COMPILE)
 def find_values(schedule, state, record, w_out, bias, lengths, now, values, sums):
     """Outputs of step k, recorded, and the value of every channel of each body in the pack."""
     first, k, toolbox = now
@@ -211,12 +187,14 @@ def integrate_pack(pack, packs, schedule, state, record, done, method, step, ste
     rows, start, slope = np.zeros(16 * nodes), np.zeros(16 * nodes), np.zeros(16 * nodes)
     force, push = np.zeros(8 * nodes), np.zeros(4 * nodes)
     lengths, values = np.zeros(8 * ((springs + 1) // 2)), np.zeros(channels.size // nodes)
-    sums, total = np.zeros(bias.size), np.zeros(4)
+    half, before, older = np.zeros(8 * nodes), np.zeros(4 * nodes), np.zeros(4 * nodes)
+    sums, total, share = np.zeros(bias.size), np.zeros(4), np.ones(4)
     kept, (_, rows_kept, row_size) = record.lengths.reshape(-1), record.lengths.shape
     stages, shift, toolbox = method_constants(method)
     per_step = 1.0 / step
 
-    load_pack(state, first, mobility, rows, lengths, springs)
+    leapfrog = method == LEAPFROG
+    load_pack(state, first, mobility, rows, lengths, springs, half, before, share, leapfrog)
     for body in range(present):
         done[first + body] = steps
     for k in range(steps):
@@ -233,6 +211,14 @@ def integrate_pack(pack, packs, schedule, state, record, done, method, step, ste
                 if stage == 0:
                     begin_rk4(rows, start, slope)
                 advance_rk4(stage, rows, start, slope, force, push, mobility, step, nodes, total)
+            elif leapfrog:
+                if k == steps - 1:
+                    copy(before, older)
+                if k == 1:
+                    share[0] = share[1] = share[2] = share[3] = 1.0
+                advance_leapfrog_pack(
+                    rows, half, force, push, before, mobility, step, share, nodes, total
+                )
             else:
                 advance_held(rows, force, push, mobility, step, shift, nodes, total)
         running = False
@@ -243,6 +229,9 @@ def integrate_pack(pack, packs, schedule, state, record, done, method, step, ste
         if not running:
             break
     store_pack(state, first, present, rows, lengths, springs)
+    if leapfrog and steps > 0:
+        pushes = before, older
+        store_pack_history(state, first, present, rows, half, pushes, mobility, step, share)
 
 
 @njit(**COMPILE)

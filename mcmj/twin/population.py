@@ -13,12 +13,20 @@ from mcmj.trajectory import State
 from mcmj.twin.kernels import Bodies, integrate_bodies
 from mcmj.twin.layout import empty_record, to_bodies, to_kernel_state, to_packs, to_schedule
 from mcmj.twin.packs import Packs, integrate_packs
-from mcmj.twin.stepping import RK4, SEMI_IMPLICIT_EULER, TOOLBOX_EULER, TOOLBOX_RK, Record
+from mcmj.twin.stepping import (
+    LEAPFROG,
+    RK4,
+    SEMI_IMPLICIT_EULER,
+    TOOLBOX_EULER,
+    TOOLBOX_RK,
+    Record,
+)
 from mcmj.validation import Array, require_count, require_number
 
 METHODS = {
     "semi_implicit_euler": SEMI_IMPLICIT_EULER,
     "rk4": RK4,
+    "leapfrog": LEAPFROG,
     "toolbox_euler": TOOLBOX_EULER,
     "toolbox_rk": TOOLBOX_RK,
 }
@@ -79,7 +87,7 @@ class Population:
 
     @property
     def states(self) -> list[State]:
-        """Every body's state, memory of the toolbox schemes included."""
+        """Every body's state, with what the toolbox schemes and the leapfrog remember."""
         time = self.steps_done * self.timestep
         return [
             State(
@@ -88,9 +96,15 @@ class Population:
                 time=time,
                 previous_lengths=self._state.lengths[b, : body.n_springs].copy(),
                 pending_output=self._state.outputs[b].copy(),
+                history=self._history(b, body.n_nodes),
             )
             for b, body in enumerate(self.bodies)
         ]
+
+    def _history(self, b: int, nodes: int) -> Array | None:
+        if METHODS[self.method] != LEAPFROG:
+            return None
+        return np.hstack([self._state.velocities[b, :nodes], self._state.history[b, :nodes]])
 
     def run(
         self, drive: Drive, start: int, stop: int, *, lengths: bool = True
@@ -128,10 +142,12 @@ class Population:
         """The error that says how body b blew up after `done` of the last `steps` steps."""
         time = (self.steps_done - steps + done) * self.timestep
         which = f"body {b}: " if len(self.bodies) > 1 else ""
+        speed = np.abs(self._state.velocities[b]).max(axis=1)
+        node = int(np.nan_to_num(speed, nan=np.inf).argmax())
         return DivergenceError(
-            f"{which}the simulation blew up after t = {time:.6g} s, method {self.method}, step "
-            f"{1e3 * self.timestep:g} ms; try a smaller step, or smaller forces and readout "
-            "weights",
+            f"{which}the simulation blew up after t = {time:.6g} s at node {node}, method "
+            f"{self.method}, step {1e3 * self.timestep:g} ms; try a smaller step, or smaller "
+            "forces and readout weights",
             time=time,
             steps_done=done,
         )

@@ -21,7 +21,7 @@ from mcmj.twin.vectors import (
     unpack_low,
 )
 
-SEMI_IMPLICIT_EULER, RK4, TOOLBOX_EULER, TOOLBOX_RK = range(4)
+SEMI_IMPLICIT_EULER, RK4, LEAPFROG, TOOLBOX_EULER, TOOLBOX_RK = range(5)
 
 COMPILE: dict[str, Any] = {
     "fastmath": {"contract"},  # not nnan, ninf: a diverging body must be seen to diverge
@@ -48,6 +48,7 @@ class KernelState(NamedTuple):
     velocities: np.ndarray  # (B, N, 2) m/s
     lengths: np.ndarray  # (B, M) m: lengths one step ago (toolbox methods only)
     outputs: np.ndarray  # (B, n_out): outputs one step ago (toolbox methods only)
+    history: np.ndarray  # (B, N, 5): see rows.load_history (leapfrog only)
 
 
 class Record(NamedTuple):

@@ -1,0 +1,64 @@
+"""Reading MuJoCo's C structs inside compiled callbacks: typed pointers from addresses."""
+
+from collections.abc import Callable
+from typing import Any
+
+from llvmlite import ir
+from numba import extending, types
+
+intrinsic: Any = extending.intrinsic  # compiled calls do not have its Python signature
+
+CFunction = Any  # a ctypes function pointer
+TAG = 20120595.0  # marks what is ours in a model: the paper's year and first page
+WORDS = types.CPointer(types.int64)  # mjModel and mjData as callbacks get them
+
+
+@intrinsic
+def doubles(typingctx: Any, address: Any) -> Any:
+    """A pointer to float64 from an integer address."""
+    return types.CPointer(types.float64)(types.int64), _int_to_pointer(ir.DoubleType())
+
+
+@intrinsic
+def integers(typingctx: Any, address: Any) -> Any:
+    """A pointer to int32 from an integer address."""
+    return types.CPointer(types.int32)(types.int64), _int_to_pointer(ir.IntType(32))
+
+
+@intrinsic
+def address_of(typingctx: Any, words: Any) -> Any:
+    """The address of a struct as an integer."""
+
+    def codegen(context, builder, signature, args):
+        return builder.ptrtoint(args[0], ir.IntType(64))
+
+    return types.int64(WORDS), codegen
+
+
+@intrinsic
+def bits(typingctx: Any, number: Any) -> Any:
+    """The 64 bits of a float64 as an integer: tendon user data holds addresses that way."""
+
+    def codegen(context, builder, signature, args):
+        return builder.bitcast(args[0], ir.IntType(64))
+
+    return types.int64(types.float64), codegen
+
+
+@intrinsic
+def call_pull(typingctx, address, x1, x2, k1, k3, d1, d3):
+    """Call the compiled spring law at an address."""
+
+    def codegen(context, builder, signature, args):
+        double = ir.DoubleType()
+        function = ir.FunctionType(double, [double] * 6)
+        return builder.call(builder.inttoptr(args[0], function.as_pointer()), args[1:])
+
+    return types.float64(types.int64, *[types.float64] * 6), codegen
+
+
+def _int_to_pointer(element: ir.Type) -> Callable:
+    def codegen(context, builder, signature, args):
+        return builder.inttoptr(args[0], element.as_pointer())
+
+    return codegen

@@ -1,0 +1,64 @@
+"""The work-precision diagram: error against DOP853 over cost, every integrator, several bodies."""
+
+import csv
+import io
+from pathlib import Path
+
+from rich.console import Console
+from rich.table import Table
+
+from mcmj import store
+from mcmj.cli import Output, main
+from mcmj.experiments.speed_accuracy import BASE, Config, Result, run
+from mcmj.plotting import save
+from mcmj.progress import progress_bar
+from mcmj.workprecision import work_precision_figure
+
+
+def work(config: Config, output: Output, out: Path) -> None:
+    with progress_bar("bodies", len(config.bodies), quiet=output.quiet) as on_bodies:
+        result = run(config, on_bodies=on_bodies)
+    store.write_text(out / "speed_accuracy.csv", as_csv(result))
+    save(work_precision_figure(result.cells, result.orders), out / "speed_accuracy.png")
+    store.write_metrics(out / "metrics.json", "speed_accuracy", config, config.seed, result.metrics)
+    if not output.quiet:
+        show(result, out)
+
+
+def as_csv(result: Result) -> str:
+    """One row a body, method and step."""
+    text = io.StringIO()
+    table = csv.writer(text)
+    horizons = [f"position_error_at_{t:g}_s" for t in result.config.horizons]
+    costs = ["us_per_simulated_second", "cost_ratio_to_euler_1ms", "stable"]
+    table.writerow(["body", "method", "step_ms", *horizons, "length_error", *costs])
+    for body, methods in result.cells.items():
+        for method, steps in methods.items():
+            for step, cell in steps.items():
+                numbers = (cell.length_error, cell.us_per_second, cell.cost_ratio, cell.stable)
+                table.writerow([body, method, step, *cell.position_errors, *numbers])
+    return text.getvalue()
+
+
+def show(result: Result, out: Path) -> None:
+    console = Console()
+    step = 1.0 if 1.0 in result.config.steps_ms else result.config.steps_ms[0]
+    table = Table(title=f"error at {step:g} ms (cost over {BASE})")
+    table.add_column("method")
+    table.add_column("order")
+    for body in result.cells:
+        table.add_column(body, justify="right")
+    for method in result.config.methods:
+        order = result.orders[method]
+        cells = [methods[method][step] for methods in result.cells.values()]
+        table.add_row(
+            method,
+            f"{order.slope:.2f}" if order else "-",
+            *(f"{c.error:.1e} ({c.cost_ratio:.2g})" if c.stable else "-" for c in cells),
+        )
+    console.print(table)
+    console.print(f"results in {out}")
+
+
+if __name__ == "__main__":
+    main("speed_accuracy", Config, work)
