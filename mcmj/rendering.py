@@ -24,8 +24,8 @@ from mcmj.validation import Array
 
 Frame = npt.NDArray[np.uint8]
 
-SIZE = 480  # pixels: a frame is two squares
-FPS = 30
+SIZE = 400  # pixels: a frame is two squares
+FPS = 25
 TRAIL = 3.0  # seconds of outputs drawn behind the dot
 STRETCHED, SHORTENED = np.array([0.84, 0.15, 0.16]), np.array([0.12, 0.31, 0.84])
 SHOWN_SHARE = 0.05  # the automatic scale makes the largest displacement this share of the body

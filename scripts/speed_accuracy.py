@@ -41,7 +41,7 @@ def as_csv(result: Result) -> str:
 
 
 def show(result: Result, out: Path) -> None:
-    console = Console()
+    console = Console(width=40 + 16 * len(result.cells))
     step = 1.0 if 1.0 in result.config.steps_ms else result.config.steps_ms[0]
     table = Table(title=f"error at {step:g} ms (cost over {BASE})")
     table.add_column("method")

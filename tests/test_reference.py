@@ -261,5 +261,5 @@ def test_divergence_is_an_error(method):
 
 
 def test_unknown_method_lists_the_choices():
-    with pytest.raises(UnknownNameError, match="dop853.*toolbox_rk"):
+    with pytest.raises(UnknownNameError, match=r"dop853.*toolbox_rk"):
         integrate(mcmj.random_body(0, 5), method="heun", steps=1)

@@ -7,7 +7,8 @@ from typing import Protocol
 import numpy as np
 
 ROUNDING = 1e-11  # errors near the reference's own are left out
-ROUGH = 2e-2  # and so are steps too long for the leading term
+ROUGH = 2e-2  # and so are errors too large for the leading term
+FINEST = 4  # of the usable steps, only the finest count: there the leading term rules
 
 
 class HasError(Protocol):
@@ -33,7 +34,7 @@ def observed_order(
     slopes, used = [], []
     for methods in cells.values():
         errors = {step: cell.error for step, cell in methods[method].items()}
-        usable = sorted(step for step, e in errors.items() if ROUNDING < e < ROUGH)
+        usable = sorted(step for step, e in errors.items() if ROUNDING < e < ROUGH)[:FINEST]
         if len(usable) >= 3:
             logs = np.log([[step, errors[step]] for step in usable])
             slopes.append(np.polyfit(logs[:, 0], logs[:, 1], 1)[0])
