@@ -3,7 +3,7 @@
 import numpy as np
 
 from mcmj.body import Body
-from mcmj.engine import Engine
+from mcmj.engines import make_engine
 from mcmj.mjcf import DEFAULT_INTEGRATOR
 from mcmj.simulation import Simulation
 from mcmj.spring_laws import SpringLaw
@@ -19,7 +19,7 @@ class Ensemble(Simulation):
     have it too; without it they are the same for all. Results do not depend on `threads`.
 
     Args:
-        body, timestep, integrator, springs, feedback_delay, substeps: as for Simulation.
+        body, timestep, integrator, springs, feedback_delay, substeps, engine: as for Simulation.
         copies: number of simulations.
         threads: number of threads.
         w_out: readout for all, or (copies, rows, n_outputs).
@@ -37,8 +37,10 @@ class Ensemble(Simulation):
         springs: str | SpringLaw = "native",
         feedback_delay: int = 0,
         substeps: int = 1,
+        engine: str = "mujoco",
     ) -> None:
-        self._engine = Engine(
+        self._engine = make_engine(
+            engine,
             body,
             copies=copies,
             threads=threads,

@@ -57,6 +57,10 @@ def show(result: Result, out: Path) -> None:
             *(f"{c.error:.1e} ({c.cost_ratio:.2g})" if c.stable else "-" for c in cells),
         )
     console.print(table)
+    console.print("orbit errors of readouts taught under A and run under B:")
+    for task, errors in result.attractor.items():
+        pairs = ", ".join(f"{name} {100 * error:.2f} %" for name, error in errors.items())
+        console.print(f"  {task}: {pairs}")
     console.print(f"results in {out}")
 
 

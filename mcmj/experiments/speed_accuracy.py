@@ -5,23 +5,21 @@ position error |p - p*| / |p* - p(0)| at a horizon, p* by DOP853; the cost is th
 second, as microseconds and as a ratio to MuJoCo's Euler at 1 ms, measured in turns.
 """
 
-import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
 from mcmj.body import Body
-from mcmj.drive import check_drive
-from mcmj.errors import DivergenceError, InvalidArgumentError, StabilityWarning, UnknownNameError
+from mcmj.errors import DivergenceError, InvalidArgumentError, UnknownNameError
+from mcmj.experiments.attractor import attractor_errors
+from mcmj.experiments.named_methods import METHODS, final_state, stepping
 from mcmj.experiments.orders import Order, observed_order
 from mcmj.generator import random_body
-from mcmj.reference import TWINS, integrate
-from mcmj.simulation import Simulation
+from mcmj.reference import integrate
 from mcmj.streams import stream
-from mcmj.timing import Work, interleaved_seconds
+from mcmj.timing import interleaved_seconds
 from mcmj.trajectory import State
-from mcmj.twin.population import Population
 from mcmj.validation import Array, require_count, require_number
 
 TOOLBOX = {"d1": (0.1, 2.0)}
@@ -36,13 +34,6 @@ BODIES: dict[str, Callable[[int], Body]] = {
     ),
     "stiff_dampers": lambda seed: random_body(seed, 30, d1=(0.1, 2.0), d3=(1e3, 1e4)),
 }
-MUJOCO = ("Euler", "leapfrog", "discrete", "implicit", "implicitfast", "RK4")
-HOOKED = ("Euler", "RK4")  # also with the cubic law as a compiled callback
-METHODS = (
-    *(f"mujoco_{name}" for name in MUJOCO),
-    *(f"mujoco_{name}_hook" for name in HOOKED),
-    *(f"twin_{name}" for name in TWINS),
-)
 BASE = "mujoco_Euler"
 
 
@@ -111,12 +102,20 @@ class Cell:
 
 @dataclass(frozen=True)
 class Result:
-    """cells[body][method][step_ms], the observed orders, and how far DOP853 agrees with itself."""
+    """What was measured.
+
+    Attributes:
+        cells: [body][method][step_ms].
+        orders: observed order by method; None where too few steps were usable.
+        self_consistency: by body, how far DOP853 at rtol 1e-12 and 1e-10 agree.
+        attractor: [task]["A_to_B"] orbit errors of readouts taught under A and run under B.
+    """
 
     config: Config
     cells: dict[str, dict[str, dict[float, Cell]]]
     orders: dict[str, Order | None]
     self_consistency: dict[str, float]
+    attractor: dict[str, dict[str, float]]
 
     @property
     def metrics(self) -> dict[str, object]:
@@ -145,6 +144,7 @@ class Result:
             name: order.steps_ms if order else None for name, order in self.orders.items()
         }
         table["reference_self_consistency"] = max(self.self_consistency.values())
+        table["attractor_orbit_error"] = self.attractor
         table["recommendation"] = {body: recommend(cells) for body, cells in self.cells.items()}
         return table
 
@@ -156,7 +156,8 @@ def run(config: Config, *, on_bodies: Callable[[int], object] = lambda bodies: N
         cells[name], consistency[name] = _run_body(config, BODIES[name](config.seed))
         on_bodies(1)
     orders = {m: observed_order(cells, m) for m in config.methods}
-    return Result(config, cells, orders, consistency)
+    attractor = attractor_errors(random_body(config.seed), seed=config.seed)
+    return Result(config, cells, orders, consistency, attractor)
 
 
 def recommend(
@@ -232,7 +233,7 @@ def _errors(
     for horizon, goal in zip(config.horizons, goals, strict=True):
         steps = round(1e3 * horizon / step_ms)
         try:
-            end = _run_method(body, method, step_ms, steps, start, forces)
+            end = final_state(body, method, step_ms, steps, start, forces)
         except DivergenceError:
             errors.append(np.inf)
             continue
@@ -245,36 +246,6 @@ def _errors(
     return tuple(errors), length_error
 
 
-def _run_method(
-    body: Body, method: str, step_ms: float, steps: int, start: State, forces: Array
-) -> State:
-    engine, name = method.split("_", 1)
-    if engine == "twin":
-        run = integrate(
-            body,
-            method=name,
-            steps=steps,
-            timestep=1e-3 * step_ms,
-            forces=forces,
-            initial_state=start,
-        )
-        assert run.final_state is not None
-        return run.final_state
-    simulation = _simulation(body, name, 1e-3 * step_ms)
-    simulation.set_state(start.positions, start.velocities)
-    simulation.rollout(steps, forces=forces, record=())
-    return simulation.state
-
-
-def _simulation(body: Body, name: str, timestep: float) -> Simulation:
-    springs = "cubic" if name.endswith("_hook") else "native"
-    with warnings.catch_warnings():  # steps that are too long are what we look for
-        warnings.simplefilter("ignore", StabilityWarning)
-        return Simulation(
-            body, integrator=name.removesuffix("_hook"), springs=springs, timestep=timestep
-        )
-
-
 def _relative(found: Array, goal: Array, origin: Array) -> float:
     with np.errstate(over="ignore"):
         error = float(np.linalg.norm(found - goal) / np.linalg.norm(goal - origin))
@@ -284,21 +255,6 @@ def _relative(found: Array, goal: Array, origin: Array) -> float:
 def _costs_per_step(config: Config, body: Body) -> dict[str, float]:
     """Median seconds of a step at 1 ms from rest, open loop, nothing recorded, in turns."""
     steps = max(20, 30_000 // body.n_springs)
-    works: dict[str, Work] = {}
-    for method in {BASE, *config.methods}:
-        engine, name = method.split("_", 1)
-        if engine == "twin":
-            works[method] = _twin_work(body, name, steps)
-        else:
-            simulation = _simulation(body, name, 1e-5)  # short steps: stable on every body
-            works[method] = lambda s=simulation: s.rollout(steps, record=())  # type: ignore[misc]
+    works = {method: stepping(body, method, steps) for method in {BASE, *config.methods}}
     seconds = interleaved_seconds(works, config.repeats)
     return {method: float(np.median(s)) / steps for method, s in seconds.items()}
-
-
-def _twin_work(body: Body, name: str, steps: int) -> Work:
-    population = Population([body], [None], method=name, timestep=1e-5)
-    drive = check_drive(
-        body, steps=steps, inputs=None, offset=None, gate=None, forces=None, closed=False
-    )
-    return lambda: population.run(drive, 0, steps, lengths=False)

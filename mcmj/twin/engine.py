@@ -16,8 +16,7 @@ TWIN_OF = {"Euler": "semi_implicit_euler", "RK4": "rk4", "leapfrog": "leapfrog"}
 class TwinEngine:
     """Copies of one body under a compiled twin; see Simulation for the arguments.
 
-    Records lengths only: positions and velocities are MuJoCo's to show. Native springs, no
-    feedback delay, no substeps.
+    Records lengths only: positions and velocities are MuJoCo's to show.
     """
 
     def __init__(
@@ -73,6 +72,24 @@ class TwinEngine:
                 arrays[name] = np.where(self.body.fixed[:, None], arrays[name], given)
         pairs = zip(arrays["positions"], arrays["velocities"], strict=True)
         self._population.set_states([State(p, v) for p, v in pairs])
+
+    def snapshot(self) -> Array:
+        """Full state (copies, n): all that `restore` needs."""
+        parts = [part.reshape(self.copies, -1) for part in self._population.kernel_state]
+        return np.hstack([*parts, np.full((self.copies, 1), float(self.steps_done))])
+
+    def restore(self, snapshot: Array) -> None:
+        """Continue from a snapshot, bit for bit."""
+        parts = self._population.kernel_state
+        sizes = [part[0].size for part in parts]
+        if np.shape(snapshot) != (self.copies, sum(sizes) + 1):
+            raise InvalidArgumentError(
+                "snapshot", f"shape {(self.copies, sum(sizes) + 1)}", f"shape {np.shape(snapshot)}"
+            )
+        pieces = np.split(snapshot[:, :-1], np.cumsum(sizes)[:-1], axis=1)
+        for part, piece in zip(parts, pieces, strict=True):
+            part[:] = piece.reshape(part.shape)  # NaN marks an empty leapfrog history
+        self._population.steps_done = int(snapshot[0, -1])
 
     def current_lengths(self) -> Array:
         """Spring lengths (copies, L) [m] at the current state."""

@@ -19,6 +19,7 @@ from mcmj.twin.stepping import (
     SEMI_IMPLICIT_EULER,
     TOOLBOX_EULER,
     TOOLBOX_RK,
+    KernelState,
     Record,
 )
 from mcmj.validation import Array, require_count, require_number
@@ -80,6 +81,11 @@ class Population:
         """Replace all readouts, from the next step on."""
         lay_out = to_packs if self._packed else to_bodies
         self._layout: Bodies | Packs = lay_out(self.bodies, readouts)
+
+    @property
+    def kernel_state(self) -> KernelState:
+        """The kernels' own arrays, bodies first; writing to them changes the state."""
+        return self._state
 
     def set_states(self, states: Sequence[State]) -> None:
         """Replace all states."""
