@@ -159,7 +159,7 @@ def twin_costs(config: Config, body: Body) -> dict[str, object]:
 
 
 def thread_speedups(config: Config, body: Body) -> dict[str, object]:
-    """Two threads against one, for MuJoCo (nothing recorded) and for the twin."""
+    """Two threads against one, for MuJoCo (nothing recorded) and the twin (outputs only)."""
     w_out, steps = small_readout(body), config.steps
     others = [random_body(config.seed + k, config.nodes) for k in range(BATCH)]
     ensembles = {n: Ensemble(body, copies=8, threads=n, w_out=w_out) for n in (1, 2)}
@@ -167,7 +167,7 @@ def thread_speedups(config: Config, body: Body) -> dict[str, object]:
     works: dict[str, Work] = {}
     for n in (1, 2):
         works[f"mujoco{n}"] = lambda e=ensembles[n]: e.rollout(steps, record=())  # type: ignore[misc]
-        works[f"twin{n}"] = _twin_work(twins[n], steps)
+        works[f"twin{n}"] = _twin_work(twins[n], steps, lengths=False)
     seconds = interleaved_seconds(works, config.repeats)
     return {
         "threads2_speedup": median_ratio(seconds, "mujoco1", "mujoco2"),
@@ -262,7 +262,7 @@ def _population(bodies: list[Body], **options: object) -> Population:
     return Population(bodies, readouts, method="semi_implicit_euler", **options)  # type: ignore[arg-type]
 
 
-def _twin_work(population: Population, steps: int) -> Work:
+def _twin_work(population: Population, steps: int, *, lengths: bool = True) -> Work:
     drive = check_drive(
         population.bodies[0],
         steps=steps,
@@ -272,7 +272,7 @@ def _twin_work(population: Population, steps: int) -> Work:
         forces=None,
         closed=True,
     )
-    return lambda: population.run(drive, 0, steps)
+    return lambda: population.run(drive, 0, steps, lengths=lengths)
 
 
 def _processor_name() -> str:

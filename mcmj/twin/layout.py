@@ -121,12 +121,23 @@ def to_kernel_state(bodies: Sequence[Body], states: Sequence[State]) -> KernelSt
 
 
 def empty_record(bodies: Sequence[Body], steps: int, *, lengths: bool) -> Record:
-    """Room for `steps` steps, lengths only if asked for; NaN where a run never came."""
+    """Room for `steps` steps, lengths only if asked for.
+
+    Not filled: the kernels' threads touch the memory first, which is most of its cost.
+    """
     longest = max(body.n_springs for body in bodies)
     return Record(
-        np.full((len(bodies), steps if lengths else 0, longest), np.nan),
-        np.full((len(bodies), steps, bodies[0].n_outputs), np.nan),
+        np.empty((len(bodies), steps if lengths else 0, longest)),
+        np.empty((len(bodies), steps, bodies[0].n_outputs)),
     )
+
+
+def blank_unused(record: Record, bodies: Sequence[Body], done: npt.NDArray[np.int64]) -> None:
+    """NaN where a body has no such spring, or blew up before."""
+    for b, body in enumerate(bodies):
+        record.lengths[b, :, body.n_springs :] = np.nan
+        record.lengths[b, done[b] :] = np.nan
+        record.outputs[b, done[b] :] = np.nan
 
 
 def _mobility(body: Body) -> Array:

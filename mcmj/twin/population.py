@@ -11,7 +11,14 @@ from mcmj.drive import Drive
 from mcmj.errors import DivergenceError, InvalidArgumentError, UnknownNameError
 from mcmj.trajectory import State
 from mcmj.twin.kernels import Bodies, integrate_bodies
-from mcmj.twin.layout import empty_record, to_bodies, to_kernel_state, to_packs, to_schedule
+from mcmj.twin.layout import (
+    blank_unused,
+    empty_record,
+    to_bodies,
+    to_kernel_state,
+    to_packs,
+    to_schedule,
+)
 from mcmj.twin.packs import Packs, integrate_packs
 from mcmj.twin.stepping import (
     LEAPFROG,
@@ -142,6 +149,7 @@ class Population:
                 firsts = range(0, count, share)
                 list(pool.map(lambda first: part(first, min(first + share, count)), firsts))
         self.steps_done += steps
+        blank_unused(record, self.bodies, done)
         return record, done
 
     def divergence(self, b: int, done: int, steps: int) -> DivergenceError:
