@@ -3,6 +3,8 @@
 With no display, `MUJOCO_GL` must be set before mujoco is imported: mcmj/__init__.py does it.
 """
 
+import os
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -28,6 +30,7 @@ SIZE = 400  # pixels: a frame is two squares
 FPS = 25
 TRAIL = 3.0  # seconds of outputs drawn behind the dot
 STRETCHED, SHORTENED = np.array([0.84, 0.15, 0.16]), np.array([0.12, 0.31, 0.84])
+REMEDY = "on Debian or Ubuntu: apt-get install libegl1 libegl-mesa0 libgl1-mesa-dri libopengl0"
 SHOWN_SHARE = 0.05  # the automatic scale makes the largest displacement this share of the body
 
 
@@ -74,13 +77,15 @@ def _strain_colours(strain: Array) -> Array:
 
 
 def _renderer(model: mujoco.MjModel, size: int) -> mujoco.Renderer:
+    chosen = os.environ.get("MUJOCO_GL") or os.environ.get("DISPLAY")
+    if sys.platform == "linux" and not chosen:
+        raise RenderingUnavailableError(f"no display, no EGL and no OSMesa library; {REMEDY}")
     try:
         model.vis.global_.offwidth = model.vis.global_.offheight = size
         return mujoco.Renderer(model, size, size)
     except Exception as error:  # each OpenGL backend raises errors of its own
         raise RenderingUnavailableError(
-            f"no off-screen OpenGL ({type(error).__name__}: {error}); "
-            "on Debian or Ubuntu install libegl1 and libgl1-mesa-dri"
+            f"no off-screen OpenGL ({type(error).__name__}: {error}); {REMEDY}"
         ) from error
 
 

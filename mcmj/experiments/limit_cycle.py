@@ -201,7 +201,8 @@ def _run_task(
         simulation.set_readout(w_out)
     total, last = (round(s / config.timestep) for s in (config.free_run, config.window))
     parts = []
-    for part in simulation.stream(total - last, record=("outputs",)):
+    before = simulation.stream(total - last, record=("outputs",)) if total > last else ()
+    for part in before:
         parts.append(part)
         on_steps(len(part))
     end = simulation.rollout(last, record=("outputs", "positions"))

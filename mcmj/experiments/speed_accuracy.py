@@ -50,6 +50,7 @@ class Config:
         force: constant horizontal forces are uniform in +-force [N].
         seed: of bodies, forces and speeds.
         repeats: rounds of the cost measurement, of which the median counts.
+        attractor: also run learned rhythms under other integrators than they were taught under.
     """
 
     bodies: tuple[str, ...] = tuple(BODIES)
@@ -60,6 +61,7 @@ class Config:
     force: float = 1.0
     seed: int = 1
     repeats: int = 7
+    attractor: bool = True
 
     def __post_init__(self) -> None:
         for kind, names, valid in (
@@ -156,7 +158,9 @@ def run(config: Config, *, on_bodies: Callable[[int], object] = lambda bodies: N
         cells[name], consistency[name] = _run_body(config, BODIES[name](config.seed))
         on_bodies(1)
     orders = {m: observed_order(cells, m) for m in config.methods}
-    attractor = attractor_errors(random_body(config.seed), seed=config.seed)
+    attractor = {}
+    if config.attractor:
+        attractor = attractor_errors(random_body(config.seed), seed=config.seed)
     return Result(config, cells, orders, consistency, attractor)
 
 

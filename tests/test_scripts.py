@@ -1,0 +1,164 @@
+"""Every script keeps the contract: files complete, deterministic, errors with a status of not 0."""
+
+import json
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import mcmj
+from mcmj.bodyfile import load_model, provenance_of_model, readouts_of_model
+
+SCRIPTS = Path(__file__).parent.parent / "scripts"
+SHORT = ["--duration", "8", "--washout", "2", "--free-run", "13", "--window", "12", "--no-video"]
+
+
+def start(name, *options, **popen):
+    return subprocess.Popen(
+        [sys.executable, SCRIPTS / f"{name}.py", *map(str, options)],
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, **popen,
+    )  # fmt: skip
+
+
+def run(name, *options):
+    process = start(name, *options)
+    out, err = process.communicate(timeout=240)
+    return process.returncode, out, err
+
+
+def metrics_of(folder):
+    document = json.loads((folder / "metrics.json").read_text())
+    assert set(document) == {"scenario", "config", "seed", "versions", "metrics"}
+    assert document["versions"]["mujoco"]
+    return document
+
+
+@pytest.fixture(scope="module")
+def limit_cycle(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("limit_cycle")
+    options = ["--task", "quadratic", "--seed", "3", "--nodes", "12", *SHORT, "--out", folder]
+    status, out, err = run("limit_cycle", *options)
+    assert status == 0, err
+    assert "quadratic" in out
+    return folder, options
+
+
+def test_limit_cycle_writes_everything(limit_cycle):
+    folder, _ = limit_cycle
+    document = metrics_of(folder)
+    task = document["metrics"]["quadratic"]
+    for name in ("orbit_error", "period_error", "train_nrmse", "condition_number"):
+        assert np.isfinite(task[name])
+    assert document["metrics"]["steps_per_second"] > 0
+    assert document["metrics"]["closed_loop_cost_ratio"] > 0.5
+    assert document["seed"] == 3
+    assert document["config"]["settings"]["nodes"] == 12
+    with np.load(folder / "trajectory.npz", allow_pickle=False) as arrays:
+        assert arrays["quadratic/outputs"].shape == (13_000, 2)
+        assert json.loads(str(arrays["provenance"]))["seed"] == 3
+    body, w_out = mcmj.from_mjcf(folder / "body.xml")
+    assert body == mcmj.random_body(3, 12)
+    model = load_model(folder / "body.xml")
+    assert np.array_equal(readouts_of_model(model)["quadratic"], w_out)
+    assert provenance_of_model(model)["config"]["seed"] == 3
+    assert (folder / "limit_cycle.png").stat().st_size > 10_000
+    assert not [path for path in folder.iterdir() if path.name.startswith(".")]
+
+
+def test_same_seed_same_bits(limit_cycle, tmp_path):
+    folder, options = limit_cycle
+    status, _, err = run("limit_cycle", *options[:-1], tmp_path, "--quiet")
+    assert status == 0, err
+    assert (tmp_path / "body.xml").read_text() == (folder / "body.xml").read_text()
+    with np.load(folder / "trajectory.npz") as a, np.load(tmp_path / "trajectory.npz") as b:
+        assert np.array_equal(a["quadratic/outputs"], b["quadratic/outputs"])
+
+
+def test_a_body_file_with_its_readout_is_not_taught_again(limit_cycle, tmp_path):
+    folder, _ = limit_cycle
+    options = ["--task", "quadratic", "--body", folder / "body.xml", *SHORT, "--out", tmp_path]
+    status, out, err = run("limit_cycle", *options)
+    assert status == 0, err
+    assert "not taught" in out
+    assert metrics_of(tmp_path)["metrics"]["quadratic"]["train_nrmse"] is None
+
+
+@pytest.mark.parametrize(
+    ("options", "text"),
+    [
+        (["--task", "waltz"], "unknown task 'waltz'; valid choices: all, lissajous"),
+        (["--body", "nowhere.xml"], "no such body file: nowhere.xml"),
+        (["--body", "nobody"], "unknown body 'nobody'; valid choices:"),
+        (["--k1", "-1", "2"], "k1: expected (low, high) with 0 < low <= high"),
+        (["--window", "5"], "window: expected at least 1.5 periods"),
+        (["--out", "/dev/null/results"], "cannot write to the output folder"),
+    ],
+)
+def test_bad_arguments_end_with_a_message(tmp_path, options, text):
+    status, _, err = run("limit_cycle", *SHORT, "--out", tmp_path, *options)
+    assert status not in (0, None)
+    assert text in " ".join(err.replace("│", " ").split())
+    assert "Traceback" not in err
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_run_that_blows_up_says_so(tmp_path):
+    options = ["--task", "quadratic", "--seed", "0", "--feedback-scale", "1e7"]
+    status, _, err = run("limit_cycle", *SHORT, *options, "--out", tmp_path, "--quiet")
+    assert status == 1
+    assert "blew up after t = " in err
+    assert not list(tmp_path.iterdir())
+
+
+def test_an_interrupt_leaves_nothing_half_written(tmp_path):
+    process = start("limit_cycle", "--seed", "1", "--no-video", "--quiet", "--out", tmp_path)
+    time.sleep(6)
+    process.send_signal(signal.SIGINT)
+    _, err = process.communicate(timeout=60)
+    assert process.returncode not in (0, None)
+    assert "interrupted" in err
+    assert not list(tmp_path.iterdir())
+
+
+def test_success_rate(tmp_path):
+    options = ["--seeds", "2", "--first-seed", "5", "--nodes", "10", "--duration", "6"]
+    options += ["--washout", "2", "--free-run", "20", "--quiet", "--out", tmp_path]
+    status, _, err = run("success_rate", *options)
+    assert status == 0, err
+    document = metrics_of(tmp_path)
+    assert document["metrics"]["all_tasks"]["of"] == 2
+    body, w_out = mcmj.from_mjcf(tmp_path / "best.xml")
+    assert w_out is None
+    assert body == mcmj.random_body(document["metrics"]["best_seed"], 10)
+
+
+def test_speed_accuracy(tmp_path):
+    methods = ["mujoco_Euler", "mujoco_leapfrog", "twin_rk4"]
+    options = ["--bodies", "toolbox_n10", "--methods", *methods, "--steps-ms", "0.5", "1", "2"]
+    options += ["--repeats", "1", "--no-attractor", "--quiet", "--out", tmp_path]
+    status, _, err = run("speed_accuracy", *options)
+    assert status == 0, err
+    metrics = metrics_of(tmp_path)["metrics"]
+    cells = {name: metrics["toolbox_n10"][name]["1"] for name in methods}
+    assert all(cell["stable"] for cell in cells.values())
+    assert cells["mujoco_leapfrog"]["error"] < 0.1 * cells["mujoco_Euler"]["error"]
+    assert metrics["reference_self_consistency"] < 1e-8
+    assert set(metrics["order"]) == set(methods)
+    assert (tmp_path / "speed_accuracy.csv").read_text().count("\n") == 10
+
+
+@pytest.mark.slow
+def test_benchmark(tmp_path):
+    options = ["--steps", "50", "--repeats", "1", "--sizes", "10", "20", "--memory-steps", "1000"]
+    status, out, err = run("benchmark", *options, "--json", "--out", tmp_path)
+    assert status == 0, err
+    metrics = metrics_of(tmp_path)["metrics"]
+    assert json.loads(out[out.index("{") :]) == metrics
+    ratios = ("closed_loop_ratio", "twin_ratio", "twin_batch_ratio", "threads2_speedup")
+    costs = [f"{engine}_ns_per_spring_step" for engine in ("mujoco", "twin", "twin_batch")]
+    for name in (*ratios, *costs, "million_step_peak_mb"):
+        assert metrics[name] > 0, name
