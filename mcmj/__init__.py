@@ -29,6 +29,7 @@ from mcmj.errors import McmjError  # noqa: E402
 from mcmj.generator import random_body  # noqa: E402
 from mcmj.mjcf import to_mjcf  # noqa: E402
 from mcmj.readout import fit_readout  # noqa: E402
+from mcmj.schedule import Phase, RandomForces, Schedule, run_schedule  # noqa: E402
 from mcmj.simulation import Simulation  # noqa: E402
 from mcmj.spring_laws import SpringLaw  # noqa: E402
 from mcmj.targets import Target, target  # noqa: E402
@@ -38,6 +39,9 @@ __all__ = [
     "Body",
     "Ensemble",
     "McmjError",
+    "Phase",
+    "RandomForces",
+    "Schedule",
     "Simulation",
     "SpringLaw",
     "Target",
@@ -46,6 +50,7 @@ __all__ = [
     "from_mjcf",
     "random_body",
     "reference",
+    "run_schedule",
     "target",
     "teach",
     "to_mjcf",

@@ -54,7 +54,8 @@ def add_appearance(root: ET.Element, body: Body) -> None:
     ET.SubElement(visual, "quality", shadowsize="0", offsamples="0", numslices="12", numstacks="6")
     ET.SubElement(
         ET.SubElement(root, "asset"),
-        "texture", type="skybox", builtin="flat", rgb1="1 1 1", width="4", height="24",
+        "texture", type="skybox", builtin="flat", rgb1="1 1 1", rgb2="1 1 1",
+        width="4", height="24",
     )  # fmt: skip
     default = ET.SubElement(root, "default")
     colour = " ".join(f"{c:g}" for c in SPRING_COLOUR)

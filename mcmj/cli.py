@@ -1,8 +1,9 @@
 """What every script does around its experiment: arguments, folder, errors, exit status."""
 
+import json
 import sys
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, TypeVar
 
@@ -43,7 +44,11 @@ def main(name: str, config_type: type[C], work: Callable[[C, Output, Path], None
         config: Annotated[config_type, tyro.conf.OmitArgPrefixes],  # type: ignore[valid-type]
         output: Annotated[Output, tyro.conf.OmitArgPrefixes],
     ) -> None:
-        work(config, output, prepare_folder(output.out or Path("results") / name))
+        folder = prepare_folder(output.out or Path("results") / name)
+        work(config, replace(output, quiet=output.quiet or output.json), folder)
+        if output.json:
+            document = json.loads((folder / "metrics.json").read_text(encoding="utf-8"))
+            print(json.dumps(document["metrics"], indent=2))
 
     try:
         tyro.cli(command, prog=f"{name}.py")

@@ -18,6 +18,7 @@ Signal = Callable[[float], Array]
 Push = Callable[[float, Array], Array]
 
 RTOL = 1e-12
+SMALLEST_RTOL = 2.3e-14  # SciPy's DOP853 takes no less
 EVALUATIONS_PER_STEP = 5000  # give up beyond this many in one control step,
 EVALUATIONS_PER_SECOND = 1_000_000  # and this many more in a second
 ATOL_SHARE = 1e-3  # absolute tolerance, over the relative one, in units of 1 m and 1 m/s
@@ -61,7 +62,10 @@ def integrate_held(
         push = _held_push(body, drive, outputs_of(lengths, w_out, body.n_outputs), k)
         until = k + _same_until(body, drive, k)
         times = timestep * np.arange(until - k + 1, dtype=np.float64)
-        states, first_step = _solve(body, _constant(push), state, times, rtol, first_step)
+        try:
+            states, first_step = _solve(body, _constant(push), state, times, rtol, first_step)
+        except DivergenceError as error:
+            raise _divergence(start.time + k * timestep, body, state).after(k) from error
         positions = states[:-1, : 2 * body.n_nodes].reshape(-1, body.n_nodes, 2)
         recorded[k:until] = spring_lengths(positions, body.springs)
         state, k = states[-1], until

@@ -55,14 +55,15 @@ def check_drive(
     Raises:
         InvalidArgumentError: wrong shapes, lengths that disagree, NaN, or no length at all.
     """
-    if forces is not None and np.ndim(forces) == 1:  # type: ignore[arg-type]
+    constant = forces is not None and np.ndim(forces) == 1  # type: ignore[arg-type]
+    if constant:
         forces = as_array("forces", forces, (body.n_nodes,))[None]
     arrays = {
         "inputs": _series("inputs", inputs, body.n_inputs, copies),
         "offset": _series("offset", offset, body.n_outputs, copies),
         "forces": _series("forces", forces, body.n_nodes, copies),
     }
-    total = _common_length(steps, arrays)
+    total = _common_length(steps, arrays, constant=constant)
     if gate is None:
         gate = np.full(body.n_outputs, float(closed))
     elif np.ndim(gate) == 0:  # type: ignore[arg-type]
@@ -78,10 +79,10 @@ def _series(name: str, value: object, width: int, copies: int | None) -> Array |
     return as_array(name, value, (None, width))
 
 
-def _common_length(steps: int | None, arrays: dict[str, Array | None]) -> int:
+def _common_length(steps: int | None, arrays: dict[str, Array | None], *, constant: bool) -> int:
     lengths = {name: array.shape[-2] for name, array in arrays.items() if array is not None}
-    if lengths.get("forces") == 1 and (steps is not None or len(lengths) > 1):
-        del lengths["forces"]  # constant
+    if constant or (lengths.get("forces") == 1 and (steps is not None or len(lengths) > 1)):
+        del lengths["forces"]
     if steps is None:
         if not lengths:
             raise InvalidArgumentError(

@@ -3,11 +3,14 @@
 The only module that touches MuJoCo's state. Arrays have the copies as their first axis.
 """
 
+from collections.abc import Sequence
+
 import mujoco
 import numpy as np
 from mujoco.batch import Batch
 
 from mcmj import laws
+from mcmj.alteration import alter
 from mcmj.body import Body
 from mcmj.bodyfile import load_model
 from mcmj.drive import Drive
@@ -70,6 +73,7 @@ class Engine:
         self._callbacks = {"springs": law is not None, "leapfrog": integrator == LEAPFROG}
         laws.install(**self._callbacks)  # first: MuJoCo's compiler calls them too
         self.model = load_model(xml)
+        self.model.actuator_biasprm[body.n_inputs :, 0] = 0.0  # open until a drive closes it
         if substeps > 1:  # the first sample at t = 0: MJCF takes no phase beyond a period
             self.model.sensor_interval[: body.n_springs, 1] -= timestep
         if law is not None:
@@ -97,6 +101,11 @@ class Engine:
         weights[:] = 0.0
         if w_out is not None:
             weights[:, :, : w_out.shape[-2]] = np.swapaxes(w_out, -1, -2)
+
+    def alter(self, cut: Sequence[int], masses: Array | None) -> None:
+        """Cut springs and change masses (N,) of all copies, for good."""
+        laws.install(**self._callbacks)
+        alter(self._batch, self.body, cut, masses)
 
     # --- state -------------------------------------------------------------------------------
 
@@ -235,7 +244,8 @@ class Engine:
             return
         copy = dead[0]
         self.steps_done += int(done[copy]) // self.substeps
-        speed = np.hypot(*np.nan_to_num(velocities[copy], nan=np.inf).T)  # no overflow
+        with np.errstate(over="ignore"):
+            speed = np.hypot(*np.nan_to_num(velocities[copy], nan=np.inf).T)
         node = int(speed.argmax())
         which = f"copy {copy}: " if self.copies > 1 else ""
         raise DivergenceError(

@@ -24,13 +24,19 @@ class BodySettings:
 
     Attributes:
         nodes: number of masses N.
-        width, height: area of the nodes [m].
-        k1, k3: (low, high) of the log-uniform stiffnesses [N/m], [N/m^3].
-        d1, d3: (low, high) of the log-uniform dampings [N s/m], [N s^3/m^3].
+        width: of the area of the nodes [m].
+        height: of the area of the nodes [m].
+        k1: (low, high) of the log-uniform linear stiffnesses [N/m].
+        k3: (low, high) of the log-uniform cubic stiffnesses [N/m^3]; 0 0: linear springs.
+        d1: (low, high) of the log-uniform linear dampings [N s/m].
+        d3: (low, high) of the log-uniform cubic dampings [N s^3/m^3]; 0 0: linear dampers.
         masses: (low, high) of the log-uniform masses [kg].
-        n_inputs, n_outputs: number of input and of feedback channels.
-        input_fraction, feedback_fraction: share of the nodes that a channel pushes.
-        input_scale, feedback_scale: weights are uniform in +-scale [N].
+        n_inputs: number of input channels.
+        input_fraction: share of the nodes that an input pushes.
+        input_scale: input weights are uniform in +-scale [N].
+        n_outputs: number of feedback channels.
+        feedback_fraction: share of the nodes that an output pushes.
+        feedback_scale: feedback weights are uniform in +-scale [N].
 
     Raises:
         InvalidArgumentError: a range or number out of bounds.

@@ -5,8 +5,8 @@ Readout law (design: one law for every experiment), for feedback channel c with 
     bias force of actuator c = g_c (sum_j user[c, j] s_j + user[c, n])     s = length sensors
 
 It is MuJoCo's own actuator law, force = gain * ctrl + bias, with ctrl as the offset. The
-actuator carries biasprm = [gate, TAG, address of the first sensor, number of sensors] and
-the weights (and, if there is room, the readout's bias) as user data.
+actuator carries biasprm = [gate, TAG, address of the first sensor, number of sensors, 1 if
+they are delayed] and the weights (and, if there is room, the readout's bias) as user data.
 
 Both callbacks do nothing in models without the TAG, so others in the process are safe. MuJoCo
 holds one callback of each kind per process: `install` refuses to replace one that is not
@@ -48,8 +48,8 @@ def _compile_readout() -> CFunction:
         sensors = numba.carray(
             doubles(data[sensors_at] + 8 * numba.int64(parameters[first + 2])), n_sensors
         )
-        if n_sensors > 0 and sensors[0] == 0.0:
-            return 0.0  # no length is 0: a delayed sensor that has nothing to show yet
+        if parameters[first + 4] != 0.0 and sensors[0] == 0.0:
+            return 0.0  # a delayed sensor that has nothing to show yet
         output = 0.0
         for j in range(n_sensors):
             output += weights[j] * sensors[j]

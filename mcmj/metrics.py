@@ -9,6 +9,7 @@ from mcmj.targets import Target
 from mcmj.validation import Array, as_array, require_number
 
 PERIODS_NEEDED = 1.5  # to measure a period
+REPEATS = 0.05  # relative mismatch below which outputs count as repeating
 ORBIT_POINTS = 4096  # of a target's polygon: chords are off by about 1e-6 of its size
 
 
@@ -37,14 +38,40 @@ def orbit_error(outputs: Array, target: Target) -> float:
     return max(_rms(there), _rms(back)) / rms_radius(wanted)
 
 
-def period(outputs: Array, timestep: float, guess: float) -> float:
-    """Mean period [s] of outputs (T, n): the lag at which they repeat best, over many periods.
+def orbit_distances(outputs: Array, target: Target) -> Array:
+    """Distances (T,) of outputs (T, n_outputs) to the target orbit, over its RMS radius."""
+    generated = as_array("outputs", outputs, (None, target.n_outputs))
+    wanted = target.orbit(ORBIT_POINTS)
+    return _distances_to_curve(generated, wanted, closed=True) / rms_radius(wanted)
 
-    The lag is as many whole periods as fit into half of the samples; the squared difference
-    between the outputs and their lagged copy is minimised around it to a fraction of a sample.
+
+def recovery_time(
+    outputs: Array, timestep: float, target: Target, *, tolerance: float = 0.05
+) -> float:
+    """Time [s] from which on the outputs (T, n_outputs) stay within the tolerance of the orbit.
+
+    Infinite unless they do so for a whole period at the end: the last output further from the
+    target orbit than tolerance x its RMS radius must come a period before the end.
+    """
+    require_number("tolerance", tolerance, 0.0, open_low=True)
+    outside = np.flatnonzero(orbit_distances(outputs, target) > tolerance)
+    time = (int(outside[-1]) + 1) * timestep if outside.size else 0.0
+    return time if time <= len(outputs) * timestep - target.period else np.inf
+
+
+def period(outputs: Array, timestep: float, guess: float) -> float:
+    """Mean period [s] of outputs (T, n): the lag at which they repeat, over many periods.
+
+    First the smallest lag from 0.2 to 3 times the guess at which the outputs repeat: a minimum
+    of their mean squared difference from their lagged copy, over twice their variance, below
+    0.05 and as deep as the deepest. Then as many whole periods as fit into half of the samples,
+    to a fraction of a sample.
 
     Args:
-        guess: expected period [s]; the true one is looked for within 20 %.
+        guess: expected period [s].
+
+    Returns:
+        The period, or NaN if the outputs do not repeat at any of these lags.
 
     Raises:
         InvalidArgumentError: outputs at rest, or shorter than 1.5 periods of the guess.
@@ -60,7 +87,10 @@ def period(outputs: Array, timestep: float, guess: float) -> float:
             f"at least {PERIODS_NEEDED} periods of {guess:g} s",
             f"{len(values) * timestep:g} s",
         )
-    estimate = _best_lag(values, guess / timestep, 0.2 * guess / timestep)
+    coarse, spacing = _first_repeat(values, guess / timestep)
+    if np.isnan(coarse):
+        return np.nan
+    estimate = _best_lag(values, coarse, max(3.0, 2.0 * spacing))
     cycles = 1
     while 2 * (cycles + 1) * estimate < len(values):
         cycles += 1
@@ -70,8 +100,12 @@ def period(outputs: Array, timestep: float, guess: float) -> float:
 
 
 def relative_period_error(outputs: Array, timestep: float, target: Target) -> float:
-    """|T - T*| / T*, T the outputs' mean period and T* the target's."""
-    return abs(period(outputs, timestep, target.period) / target.period - 1.0)
+    """|T - T*| / T*, T the outputs' mean period and T* the target's; infinite without a period."""
+    values = as_array("outputs", outputs, (None, target.n_outputs))
+    if (np.ptp(values, axis=0) <= 1e-9 * (1.0 + np.abs(values).max())).all():
+        return np.inf
+    found = period(values, timestep, target.period)
+    return np.inf if np.isnan(found) else abs(found / target.period - 1.0)
 
 
 def relative_amplitude_error(outputs: Array, target: Target) -> float:
@@ -102,6 +136,25 @@ def _to_segment(points: Array, start: Array, end: Array) -> Array:
     fraction = ((points - start) * along).sum(axis=1) / np.where(squared > 0, squared, 1.0)
     foot = start + np.clip(fraction, 0.0, 1.0)[:, None] * along
     return np.linalg.norm(points - foot, axis=1)
+
+
+def _first_repeat(values: Array, guess: float) -> tuple[float, int]:
+    """Smallest lag [samples] at which values repeat (NaN: none), and the spacing searched."""
+    highest = min(3.0 * guess, 0.8 * len(values))
+    spacing = max(1, int(guess / 400))
+    sparse = values[::spacing] - values.mean(axis=0)
+    lags = np.arange(max(1, int(0.2 * guess / spacing)), int(highest / spacing))
+    costs = np.array([_difference(sparse, int(lag)) for lag in lags])
+    inside = np.flatnonzero((costs[1:-1] <= costs[:-2]) & (costs[1:-1] <= costs[2:])) + 1
+    deep = inside[costs[inside] < min(REPEATS, costs[inside].min(initial=REPEATS) + 0.01)]
+    return (float(lags[deep[0]] * spacing) if deep.size else np.nan), spacing
+
+
+def _difference(values: Array, lag: int) -> float:
+    """Mean squared difference from the lagged copy, over twice the overlap's variance."""
+    head, tail = values[:-lag], values[lag:]
+    power = (head**2).sum() + (tail**2).sum()
+    return float(((head - tail) ** 2).sum() / power) if power > 0 else 1.0
 
 
 def _best_lag(values: Array, centre: float, reach: float) -> float:

@@ -74,7 +74,7 @@ def to_mjcf(
     _add_springs(tendons, body, spring_law(springs))
     actuators = ET.SubElement(root, "actuator")
     active = None if w_out is None else checked_readout(body, w_out)
-    _add_channels(tendons, actuators, body, active)
+    _add_channels(tendons, actuators, body, active, delayed=feedback_delay > 0)
     _add_sensors(root, body, timestep, feedback_delay, control_period)
     ET.indent(root)
     return ET.tostring(root, encoding="unicode") + "\n"
@@ -182,7 +182,7 @@ def _add_springs(tendons: ET.Element, body: Body, law: SpringLaw | None) -> None
 
 
 def _add_channels(
-    tendons: ET.Element, actuators: ET.Element, body: Body, w_out: Array | None
+    tendons: ET.Element, actuators: ET.Element, body: Body, w_out: Array | None, *, delayed: bool
 ) -> None:
     for c in range(body.n_inputs):
         _add_push(tendons, f"in{c}", body, body.w_in[:, c])
@@ -193,7 +193,7 @@ def _add_channels(
             "name": f"fb{c}",
             "tendon": f"fb{c}",
             "biastype": "user",
-            "biasprm": numbers([float(w_out is not None), TAG, 0, body.n_springs]),
+            "biasprm": numbers([float(w_out is not None), TAG, 0, body.n_springs, delayed]),
         }
         if w_out is not None:
             channel["user"] = numbers(w_out[:, c])

@@ -28,7 +28,7 @@ TASK_COLOURS = ("#1f4fd6", "black", "#2a9d3a")
 TITLES = {
     "van_der_pol": "Van der Pol",
     "quadratic": "Quadratic limit cycle",
-    "lissajous": "Lissajous 2:3",
+    "lissajous": "Lissajous 3:2",
 }
 
 

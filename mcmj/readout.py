@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.linalg import svd
+from threadpoolctl import threadpool_limits
 
 from mcmj.errors import InvalidArgumentError
 from mcmj.validation import Array, as_array, require_number
@@ -16,7 +17,7 @@ class Fit:
     Attributes:
         w_out: (L, n_outputs), or (L + 1, n_outputs) with the bias in the last row.
         train_nrmse: root mean square error on the rows fitted, over the targets' standard
-            deviation, all outputs together.
+            deviation, all outputs together, both weighted as the rows are.
         rank: number of singular values of the data above the rounding error.
         condition_number: largest over smallest singular value of the data.
         rows: number of samples fitted.
@@ -49,19 +50,26 @@ class Regression:
         self._factor: Array | None = None
         self._n_lengths = 0
         self._rows = 0
+        self._weight = 0.0  # sum over the rows
         self._mean = np.zeros(0)  # of the targets, and their summed squares about it
         self._scatter = 0.0
 
-    def add(self, lengths: Array, targets: Array) -> None:
+    def add(self, lengths: Array, targets: Array, *, weight: float = 1.0) -> None:
         """Fold in samples: lengths (M, L) and targets (M, n_outputs).
 
+        Args:
+            weight: of their squared errors, > 0.
+
         Raises:
-            InvalidArgumentError: wrong shapes, or NaN.
+            InvalidArgumentError: wrong shapes, NaN, or a weight that is not positive.
         """
+        require_number("weight", weight, 0.0, open_low=True)
         x = as_array("lengths", lengths, (None, None))
         y = as_array("targets", targets, (len(x), None))
         ones = np.ones((len(x), int(self._bias)))
         block = np.hstack([ones, x, y])
+        if weight != 1.0:
+            block *= np.sqrt(weight)
         if self._factor is None:
             self._n_lengths = x.shape[1]
             self._factor = np.zeros((0, block.shape[1]))
@@ -71,19 +79,22 @@ class Regression:
         elif y.shape[1] != len(self._mean):
             raise InvalidArgumentError("targets", f"{len(self._mean)} columns", y.shape[1])
         stacked = np.vstack([self._factor, block])
-        self._factor = np.asarray(np.linalg.qr(stacked, mode="r"))
-        self._count(y)
+        with threadpool_limits(1, "blas"):  # the same bits on any number of cores
+            self._factor = np.asarray(np.linalg.qr(stacked, mode="r"))
+        self._rows += len(y)
+        self._count(y, weight)
 
-    def _count(self, y: Array) -> None:
+    def _count(self, y: Array, weight: float) -> None:
         """Merge mean and scatter of new targets (Chan et al. 1979): large means do no harm."""
-        before, new = self._rows, len(y)
+        before, new = self._weight, weight * len(y)
         if new == 0:
             return
         mean = y.mean(axis=0)
         shift = mean - self._mean
-        self._rows = before + new
-        self._scatter += ((y - mean) ** 2).sum() + (shift**2).sum() * before * new / self._rows
-        self._mean = self._mean + shift * new / self._rows
+        self._weight = before + new
+        scatter = weight * ((y - mean) ** 2).sum()
+        self._scatter += scatter + (shift**2).sum() * before * new / self._weight
+        self._mean = self._mean + shift * new / self._weight
 
     def solve(self, ridge: float = 0.0) -> Fit:
         """The readout for a ridge parameter >= 0.
@@ -99,8 +110,9 @@ class Regression:
             raise InvalidArgumentError("lengths", "at least one sample", 0)
         n_unknowns = self._n_lengths + int(self._bias)
         top, reached = self._factor[:, :n_unknowns], self._factor[:, n_unknowns:]
-        weights, values = self._minimise(top, reached, ridge)
-        residual = reached - top @ weights
+        with threadpool_limits(1, "blas"):
+            weights, values = self._minimise(top, reached, ridge)
+            residual = reached - top @ weights
         rank = int((values > values[0] * max(self._rows, n_unknowns) * np.finfo(float).eps).sum())
         return Fit(
             w_out=np.roll(weights, -1, axis=0) if self._bias else weights,
@@ -108,7 +120,7 @@ class Regression:
                 float(np.sqrt((residual**2).sum() / self._scatter)) if self._scatter > 0 else np.inf
             ),
             rank=rank,
-            condition_number=float(values[0] / values[-1]) if values[-1] > 0 else np.inf,
+            condition_number=_condition_number(values, n_unknowns),
             rows=self._rows,
         )
 
@@ -126,6 +138,13 @@ class Regression:
         goal = np.vstack([reached, np.zeros((len(penalty), reached.shape[1]))])
         u, damped, vt = svd(stacked, full_matrices=False)
         return vt.T @ ((u.T @ goal) / damped[:, None]), values
+
+
+def _condition_number(values: Array, unknowns: int) -> float:
+    """Of a matrix with that many columns and these singular values, largest first."""
+    if len(values) < unknowns or values[-1] == 0.0:
+        return np.inf
+    return float(values[0] / values[-1])
 
 
 def fit_readout(lengths: Array, targets: Array, ridge: float = 0.0, *, bias: bool = False) -> Array:

@@ -16,7 +16,7 @@ from dataclasses import replace
 import numpy as np
 
 from mcmj.body import Body
-from mcmj.dop853 import RTOL, Signal, integrate_continuous, integrate_held
+from mcmj.dop853 import RTOL, SMALLEST_RTOL, Signal, integrate_continuous, integrate_held
 from mcmj.drive import Drive, check_drive
 from mcmj.errors import UnknownNameError
 from mcmj.mjcf import checked_readout
@@ -74,7 +74,7 @@ def integrate(
     require_number("timestep", timestep, 0.0, open_low=True)
     start = _checked_state(body, initial_state)
     if method == "dop853":
-        require_number("rtol", rtol, 1e-14, 1e-2)
+        require_number("rtol", rtol, SMALLEST_RTOL, 1e-2)
         return integrate_held(body, drive, readout, timestep, start, rtol=rtol)
     return _integrate_twin(body, drive, readout, method, timestep, start)
 
@@ -114,7 +114,7 @@ def integrate_smooth(
         closed=readout is not None,
     )
     require_number("timestep", timestep, 0.0, open_low=True)
-    require_number("rtol", rtol, 1e-14, 1e-2)
+    require_number("rtol", rtol, SMALLEST_RTOL, 1e-2)
     return integrate_continuous(
         body,
         steps,

@@ -13,6 +13,7 @@ from dataclasses import replace
 import mujoco
 import numpy as np
 
+from mcmj.alteration import checked_cut, checked_masses
 from mcmj.body import Body
 from mcmj.drive import Drive, check_drive
 from mcmj.engine import Engine
@@ -117,6 +118,18 @@ class Simulation:
         """
         self._w_out = None if w_out is None else self._checked_readout(w_out)
         self._engine.set_readout(self._w_out)
+
+    def alter(self, *, cut: Sequence[int] = (), masses: object = None) -> None:
+        """Cut springs and change masses (N,) [kg], for good; `body` stays what it was.
+
+        Raises:
+            InvalidArgumentError: no such spring, a wrong mass, or the engine is the twin.
+        """
+        springs = checked_cut(self.body, cut)
+        weights = None if masses is None else checked_masses(self.body, masses)
+        if not isinstance(self._engine, Engine):
+            raise InvalidArgumentError("engine", "'mujoco' for bodies that change", "'twin'")
+        self._engine.alter(springs, weights)
 
     def reset(self) -> None:
         """Back to the start: the body's positions, at rest, time 0."""
@@ -249,9 +262,10 @@ class Simulation:
         if self._w_out is None:
             return np.zeros((*lengths.shape[:-1], self.body.n_outputs))
         n = self.body.n_springs
-        return lengths @ self._w_out[..., :n, :] + self._w_out[..., n:, :].sum(
-            axis=-2, keepdims=True
-        )
+        weights = np.ascontiguousarray(np.swapaxes(self._w_out[..., :n, :], -1, -2))
+        bias = self._w_out[..., n:, :].sum(axis=-2, keepdims=True)
+        # not @: BLAS sums a row differently in chunks of another size or on more threads
+        return np.einsum("...tl,...cl->...tc", lengths, weights) + bias
 
 
 def _with_hook(drive: Drive, hook: Hook, step: int, simulation: Simulation) -> Drive:

@@ -135,7 +135,7 @@ def warn_if_unstable(
     advice = _advice(system, timestep, integrator)
     warnings.warn(
         f"step {1e3 * step:.4g} ms is above {1e3 * advice.limit:.4g} ms, the stability limit of "
-        f"integrator {integrator} for this body at rest: it will blow up; use {advice}",
+        f"integrator {integrator} for this body at rest: it may blow up; use {advice}",
         StabilityWarning,
         stacklevel=3,
     )

@@ -19,6 +19,9 @@ PURPOSES = (
     "length_noise",
     "forces",
     "initial_state",
+    "schedule_forces",
+    "schedule_noise",
+    "rest_noise",
 )
 
 

@@ -23,11 +23,13 @@ class Target:
         name: for figures and files.
         period: [s].
         curve: function of times (T,) in [0, period] -> (T, n_outputs).
+        rhs: of the autonomous system x' = rhs(t, x) whose limit cycle it is, if it is one.
     """
 
     name: str
     period: float
     curve: Callable[[Array], Array] = field(repr=False)
+    rhs: Callable[[float, Array], Array] | None = field(default=None, repr=False)
 
     def __post_init__(self) -> None:
         require_number("period", self.period, 0.0, open_low=True)
@@ -92,7 +94,7 @@ def limit_cycle(
     ]
     if not returns:
         raise McmjError(f"{name}: no return to x = {origin} within {longest_period:g} s")
-    return Target(name, returns[0], lambda times: solution.sol(times).T)
+    return Target(name, returns[0], lambda times: solution.sol(times).T, rhs)
 
 
 def from_array(name: str, values: npt.ArrayLike, timestep: float) -> Target:

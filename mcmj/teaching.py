@@ -10,7 +10,7 @@ from mcmj.readout import Fit, Regression
 from mcmj.simulation import CHUNK, Simulation
 from mcmj.streams import stream
 from mcmj.targets import Target
-from mcmj.validation import require_number
+from mcmj.validation import require_count, require_number
 
 
 @dataclass(frozen=True)
@@ -26,6 +26,11 @@ class Teaching:
         ridge_per_row: ridge parameter over the number of rows; s^2 does what a length noise
             of s would, without randomness.
         bias: fit a constant too (the paper's readout has none).
+        rest_runs: number of runs taught from total rest, without washout, beside the one
+            above; they teach the body to swing up.
+        rest_duration: of each of them [s]; the target starts at time 0 at full size.
+        rest_weight: of their squared errors, against 1. Tiny, for a linear readout cannot
+            serve both well: at 0.01 it already loses the cycle.
     """
 
     duration: float = 120.0
@@ -34,6 +39,9 @@ class Teaching:
     length_noise: float = 0.0
     ridge_per_row: float = 0.0
     bias: bool = False
+    rest_runs: int = 0
+    rest_duration: float = 12.0
+    rest_weight: float = 1e-3
 
     def __post_init__(self) -> None:
         require_number("duration", self.duration, 0.0, open_low=True)
@@ -44,6 +52,9 @@ class Teaching:
             )
         for name in ("noise", "length_noise", "ridge_per_row"):
             require_number(name, getattr(self, name), 0.0)
+        require_count("rest_runs", self.rest_runs, 0)
+        for name in ("rest_duration", "rest_weight"):
+            require_number(name, getattr(self, name), 0.0, open_low=True)
 
 
 def teach(
@@ -71,6 +82,8 @@ def teach(
     step = simulation.timestep
     total, washout = round(teaching.duration / step), round(teaching.washout / step)
     regression = Regression(bias=teaching.bias)
+    if teaching.rest_runs:
+        _teach_from_rest(simulation, target, teaching, seed, regression)
     start_step = round(simulation.time / step)
     for start in range(0, total, CHUNK):
         steps = np.arange(start, min(start + CHUNK, total))
@@ -87,6 +100,21 @@ def teach(
     fit = regression.solve(ridge=teaching.ridge_per_row * (total - washout))
     simulation.set_readout(fit.w_out)
     return fit
+
+
+def _teach_from_rest(
+    simulation: Simulation, target: Target, teaching: Teaching, seed: int, regression: Regression
+) -> None:
+    """Fold in runs of teacher forcing from total rest; the simulation is left as it was."""
+    noise, start = stream(seed, "rest_noise"), simulation.snapshot()
+    step = simulation.timestep
+    clean = target.sample(np.arange(round(teaching.rest_duration / step)) * step)
+    for _ in range(teaching.rest_runs):
+        noisy = clean + teaching.noise * noise.standard_normal(clean.shape)
+        simulation.reset()
+        rollout = simulation.rollout(offset=noisy, gate=0.0, record=("lengths",))
+        regression.add(rollout.get("lengths"), clean, weight=teaching.rest_weight)
+    simulation.restore(start)
 
 
 def synchronise(simulation: Simulation, target: Target, duration: float) -> None:

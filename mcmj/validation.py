@@ -23,6 +23,8 @@ def as_array(name: str, value: object, shape: Sequence[int | None]) -> Array:
     """
     wanted = "(" + ", ".join("any" if n is None else str(n) for n in shape) + ")"
     try:
+        if np.iscomplexobj(value):  # type: ignore[arg-type]
+            raise TypeError("complex")
         array = np.array(value, dtype=np.float64, order="C", copy=None)
     except (TypeError, ValueError) as error:
         raise InvalidArgumentError(name, f"numbers of shape {wanted}", repr(value)) from error
@@ -59,6 +61,8 @@ def require_number(
     name: str, value: float, low: float, high: float = np.inf, *, open_low: bool = False
 ) -> None:
     """Raise unless low <= value <= high (low < value, if open_low) and value is finite."""
+    if isinstance(value, bool) or not isinstance(value, int | float | np.integer | np.floating):
+        raise InvalidArgumentError(name, "a number", repr(value))
     inside = np.isfinite(value) and (low < value if open_low else low <= value) and value <= high
     if not inside:
         left = "(" if open_low else "["

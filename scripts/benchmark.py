@@ -1,6 +1,5 @@
 """Measure every speed claim of mcmj on this machine: ratios, medians, side by side."""
 
-import json
 from pathlib import Path
 
 from rich.console import Console
@@ -19,9 +18,7 @@ def work(config: Config, output: Output, out: Path) -> None:
     assert isinstance(metrics, dict)
     store.write_metrics(out / "metrics.json", "benchmark", config, config.seed, metrics)
     plotting.save(plotting.growth_figure(metrics["growth"]), out / "growth.png")
-    if output.json:
-        print(json.dumps(metrics, indent=2))
-    elif not output.quiet:
+    if not output.quiet:
         show(metrics, out)
 
 

@@ -12,7 +12,7 @@ from rich.table import Table
 
 from mcmj import plotting, store
 from mcmj.cli import Output, main
-from mcmj.experiments.limit_cycle import Config, Result, run, total_steps
+from mcmj.experiments.limit_cycle import Config, Result, checkpoints, run, total_steps
 from mcmj.mjcf import to_mjcf
 from mcmj.progress import progress_bar
 from mcmj.rendering import RenderingUnavailableError, limit_cycle_video
@@ -20,8 +20,14 @@ from mcmj.rendering import RenderingUnavailableError, limit_cycle_video
 
 def work(config: Config, output: Output, out: Path) -> None:
     with progress_bar("teaching and running", total_steps(config), quiet=output.quiet) as on_steps:
-        result = run(config, on_steps=on_steps)
+        try:
+            result = run(config, folder=out, on_steps=on_steps)
+        except KeyboardInterrupt:
+            print("limit_cycle: the same command goes on from the last chunk", file=sys.stderr)
+            raise
     write(result, out)
+    for checkpoint in checkpoints(config, out).values():
+        checkpoint.remove()
     if output.video:
         write_videos(result, out)
     if not output.quiet:

@@ -43,11 +43,13 @@ CHAINS = (
     (("simulation", "metrics"), ("experiments.limit_cycle",)),
 )
 MUJOCO = {
+    "alteration",
     "bodyfile",
     "engine",
     "experiments.benchmark",
     "experiments.full_scene",
-    "experiments.limit_cycle",  # times bare mj_step
+    "experiments.limit_cycle",  # reads the model of a body file
+    "experiments.loop_cost",  # times bare mj_step
     "laws",
     "leapfrog",
     "quiet",

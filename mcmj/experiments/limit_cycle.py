@@ -1,8 +1,12 @@
 """Fig. 5: one body learns a limit cycle by teacher forcing, then runs free in MuJoCo."""
 
+import hashlib
 import os
+import warnings
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from threading import Event
 
 import mujoco
 import numpy as np
@@ -10,17 +14,27 @@ from threadpoolctl import threadpool_limits
 
 from mcmj import metrics
 from mcmj.body import Body
-from mcmj.bodyfile import body_of_model, load_model, provenance_of_model, readouts_of_model
-from mcmj.errors import DivergenceError, InvalidArgumentError, UnknownNameError
+from mcmj.bodyfile import (
+    body_of_model,
+    load_model,
+    provenance_of_model,
+    readout_of_model,
+    readouts_of_model,
+    spring_law_of_model,
+)
+from mcmj.checkpoint import Checkpoint
+from mcmj.errors import DivergenceError, InvalidArgumentError, McmjWarning, UnknownNameError
+from mcmj.experiments.loop_cost import closed_loop_cost
+from mcmj.freerun import free_run, resume, window_errors
 from mcmj.generator import BodySettings, draw_body
 from mcmj.library import body_path
-from mcmj.mjcf import DEFAULT_INTEGRATOR
+from mcmj.mjcf import DEFAULT_INTEGRATOR, to_mjcf
 from mcmj.progress import OnSteps
 from mcmj.readout import Fit
 from mcmj.simulation import Simulation
+from mcmj.spring_laws import NATIVE
 from mcmj.targets import TARGETS, Target, target
 from mcmj.teaching import Teaching, synchronise, teach
-from mcmj.timing import interleaved_seconds, median_ratio
 from mcmj.validation import Array, require_number
 
 
@@ -55,11 +69,15 @@ class Config:
     def __post_init__(self) -> None:
         if self.task not in (*TARGETS, "all"):
             raise UnknownNameError("task", self.task, [*TARGETS, "all"])
+        require_number("timestep", self.timestep, 0.0, open_low=True)
         require_number("free_run", self.free_run, 0.0, open_low=True)
         require_number("window", self.window, 0.0, self.free_run, open_low=True)
         if self.body is not None and self.settings != BodySettings():
+            changed = [
+                k for k, v in asdict(BodySettings()).items() if getattr(self.settings, k) != v
+            ]
             raise InvalidArgumentError(
-                "settings", "none beside a body, which has its own", self.settings
+                ", ".join(changed), "no settings beside a body, which has its own", self.body
             )
 
     @property
@@ -81,6 +99,7 @@ class TaskResult:
         times, outputs: (T,) [s] and (T, n_outputs) of the free run; its time goes on from
             teacher forcing, so the target's value at the same moment is target.sample(times).
         positions: (window, N, 2) of the nodes during the last window [m].
+        windows: errors in consecutive windows, see mcmj.freerun.window_errors.
     """
 
     target: Target
@@ -90,6 +109,7 @@ class TaskResult:
     outputs: Array
     positions: Array
     errors: dict[str, float]
+    windows: dict[str, object]
 
 
 @dataclass(frozen=True)
@@ -113,6 +133,7 @@ class Result:
                 **task.errors,
                 "train_nrmse": fit.train_nrmse if fit else None,
                 "condition_number": fit.condition_number if fit else None,
+                "windows": task.windows,
             }
         table["steps_per_second"] = self.steps_per_second
         table["closed_loop_cost_ratio"] = self.closed_loop_cost_ratio
@@ -125,7 +146,24 @@ def get_body(config: Config) -> tuple[Body, dict[str, Array], dict[str, object]]
         body = draw_body(config.noise_seed, config.settings)
         return body, {}, {"seed": config.noise_seed, "settings": asdict(config.settings)}
     model = load_model(body_path(config.body or "general"))
-    return body_of_model(model), readouts_of_model(model), provenance_of_model(model) or {}
+    _warn_if_other_physics(config, model)
+    body, readouts = body_of_model(model), readouts_of_model(model)
+    active = readout_of_model(model)
+    if not readouts and active is not None and config.task != "all":
+        readouts = {config.task: active}
+    return body, readouts, provenance_of_model(model) or {}
+
+
+def _warn_if_other_physics(config: Config, model: mujoco.MjModel) -> None:
+    """A file may have been written for another step, integrator or spring law than is run."""
+    springs, step = spring_law_of_model(model), float(model.opt.timestep)
+    if springs != NATIVE or step != config.timestep:
+        warnings.warn(
+            f"the body file was written for {1e3 * step:g} ms and {springs} springs; this run "
+            f"takes {1e3 * config.timestep:g} ms, {config.integrator} and native springs",
+            McmjWarning,
+            stacklevel=2,
+        )
 
 
 def total_steps(config: Config) -> int:
@@ -134,8 +172,24 @@ def total_steps(config: Config) -> int:
     return len(config.tasks) * round(seconds / config.timestep)
 
 
-def run(config: Config, *, on_steps: OnSteps = lambda steps: None) -> Result:
+def checkpoints(config: Config, folder: Path) -> dict[str, Checkpoint]:
+    """Where the free runs of a config keep what they need to go on, one a task."""
+    body, readouts, _ = get_body(config)
+    digest = hashlib.sha256(to_mjcf(body, readouts=readouts).encode()).hexdigest()
+    return {
+        name: Checkpoint(folder / f".checkpoint-{name}", [config, digest], body.n_outputs)
+        for name in config.tasks
+    }
+
+
+def run(
+    config: Config, *, folder: Path | None = None, on_steps: OnSteps = lambda steps: None
+) -> Result:
     """Teach and run every task, and measure what the closed loop costs.
+
+    Args:
+        folder: where checkpoints are kept, and gone on from; `checkpoints` removes them.
+        on_steps: called with the number of steps done after every chunk, for progress bars.
 
     Raises:
         DivergenceError: a simulation blew up.
@@ -143,16 +197,19 @@ def run(config: Config, *, on_steps: OnSteps = lambda steps: None) -> Result:
     """
     body, _, source = get_body(config)
     tasks = {}
-    for name, outcome in run_tasks(config, on_steps=on_steps).items():
+    for name, outcome in run_tasks(config, folder=folder, on_steps=on_steps).items():
         if isinstance(outcome, DivergenceError):
             raise outcome
         tasks[name] = outcome
-    speed, ratio = closed_loop_cost(body, next(iter(tasks.values())).w_out, config)
+    w_out = next(iter(tasks.values())).w_out
+    speed, ratio = closed_loop_cost(
+        body, w_out, timestep=config.timestep, integrator=config.integrator
+    )
     return Result(config, body, source, tasks, speed, ratio)
 
 
 def run_tasks(
-    config: Config, *, on_steps: OnSteps = lambda steps: None
+    config: Config, *, folder: Path | None = None, on_steps: OnSteps = lambda steps: None
 ) -> dict[str, TaskResult | DivergenceError]:
     """Teach and run every task, on several threads; a task that blew up is its error.
 
@@ -160,22 +217,40 @@ def run_tasks(
         BodyFileError, InvalidArgumentError: a body that cannot do the task.
     """
     body, readouts, _ = get_body(config)
+    kept = {} if folder is None else checkpoints(config, folder)
+    stopped = Event()
     targets = {name: target(name) for name in config.tasks}
     for wanted in targets.values():
-        _check_task(config, body, wanted)
+        check_task(config, body, wanted)
+
+    def on_part(steps: int) -> None:
+        if stopped.is_set():
+            raise InterruptedError
+        on_steps(steps)
 
     def outcome(name: str) -> TaskResult | DivergenceError:
         try:
-            return _run_task(config, body, targets[name], readouts.get(name), on_steps)
+            return _run_task(
+                config, body, targets[name], readouts.get(name), kept.get(name), on_part
+            )
         except DivergenceError as error:
             return error
 
     # rollouts release the GIL; BLAS threads on top would wait for each other
     with threadpool_limits(1, "blas"), ThreadPoolExecutor(os.cpu_count()) as pool:
-        return dict(zip(targets, pool.map(outcome, targets), strict=True))
+        try:
+            return dict(zip(targets, pool.map(outcome, targets), strict=True))
+        except BaseException:
+            stopped.set()  # the other tasks end with their chunk
+            raise
 
 
-def _check_task(config: Config, body: Body, wanted: Target) -> None:
+def check_task(config: Config, body: Body, wanted: Target) -> None:
+    """Check that a body has the channels, and the window the length, that a target needs.
+
+    Raises:
+        InvalidArgumentError: one of them does not.
+    """
     if body.n_outputs != wanted.n_outputs:
         raise InvalidArgumentError(
             "body", f"{wanted.n_outputs} feedback channels for {wanted.name}", body.n_outputs
@@ -189,63 +264,60 @@ def _check_task(config: Config, body: Body, wanted: Target) -> None:
 
 
 def _run_task(
-    config: Config, body: Body, wanted: Target, w_out: Array | None, on_steps: OnSteps
+    config: Config,
+    body: Body,
+    wanted: Target,
+    w_out: Array | None,
+    checkpoint: Checkpoint | None,
+    on_steps: OnSteps,
 ) -> TaskResult:
     simulation = Simulation(body, timestep=config.timestep, integrator=config.integrator)
-    fit = None
-    if w_out is None:
-        fit = teach(simulation, wanted, config.teaching, config.noise_seed, on_steps=on_steps)
-        w_out = fit.w_out
+    resumed = None if checkpoint is None else resume(simulation, checkpoint)
+    if resumed is None:
+        done, fit = None, _ready(simulation, config, wanted, w_out, on_steps)
     else:
-        synchronise(simulation, wanted, config.teaching.washout)
-        simulation.set_readout(w_out)
+        done, fit = resumed
+        on_steps(round(config.teaching.duration / config.timestep) + len(done))
     total, last = (round(s / config.timestep) for s in (config.free_run, config.window))
-    parts = []
-    before = simulation.stream(total - last, record=("outputs",)) if total > last else ()
-    for part in before:
-        parts.append(part)
-        on_steps(len(part))
+    first = free_run(
+        simulation, total - last, done=done, checkpoint=checkpoint, fit=fit, on_steps=on_steps
+    )
     end = simulation.rollout(last, record=("outputs", "positions"))
     on_steps(last)
-    outputs = end.get("outputs")
-    errors = {
-        "orbit_error": metrics.orbit_error(outputs, wanted),
-        "period_error": metrics.relative_period_error(outputs, config.timestep, wanted),
-        "amplitude_error": metrics.relative_amplitude_error(outputs, wanted),
-    }
+    outputs = np.concatenate([first, end.get("outputs")])
+    readout = simulation.w_out
+    assert readout is not None
+    start = round(simulation.time / config.timestep) - total
     return TaskResult(
         target=wanted,
-        w_out=w_out,
+        w_out=readout,
         fit=fit,
-        times=np.concatenate([part.times for part in (*parts, end)]),
-        outputs=np.concatenate([part.get("outputs") for part in (*parts, end)]),
+        times=config.timestep * np.arange(start, start + total, dtype=np.float64),
+        outputs=outputs,
         positions=end.get("positions"),
-        errors=errors,
+        errors=_errors(outputs[-last:], config.timestep, wanted),
+        windows=window_errors(outputs, config.timestep, wanted),
     )
 
 
-def closed_loop_cost(
-    body: Body, w_out: Array, config: Config, *, steps: int = 4000, repeats: int = 7
-) -> tuple[float, float]:
-    """Steps a second in closed loop with lengths and outputs recorded, and its cost ratio.
+def _ready(
+    simulation: Simulation,
+    config: Config,
+    wanted: Target,
+    w_out: Array | None,
+    on_steps: OnSteps,
+) -> Fit | None:
+    """Teach, or bring onto the target a body that has its readout already."""
+    if w_out is None:
+        return teach(simulation, wanted, config.teaching, config.noise_seed, on_steps=on_steps)
+    synchronise(simulation, wanted, config.teaching.washout)
+    simulation.set_readout(w_out)
+    return None
 
-    The ratio is the median over `repeats` of the time for `steps` control steps through
-    Simulation.rollout, over the time of as many bare mj_step of the same model from the same
-    state with the loop open, measured in turns.
-    """
-    simulation = Simulation(
-        body, w_out=w_out, timestep=config.timestep, integrator=config.integrator
-    )
-    bare, free = mujoco.MjData(simulation.model), body.free
 
-    def step_bare() -> None:
-        state = simulation.state
-        bare.qpos[:] = (state.positions - body.positions)[free].ravel()
-        bare.qvel[:] = state.velocities[free].ravel()
-        mujoco.mj_step(simulation.model, bare, nstep=steps)
-
-    seconds = interleaved_seconds(
-        {"closed": lambda: simulation.rollout(steps), "bare": step_bare}, repeats
-    )
-    speed = steps / float(np.median(seconds["closed"]))
-    return speed, median_ratio(seconds, "closed", "bare")
+def _errors(outputs: Array, timestep: float, wanted: Target) -> dict[str, float]:
+    return {
+        "orbit_error": metrics.orbit_error(outputs, wanted),
+        "period_error": metrics.relative_period_error(outputs, timestep, wanted),
+        "amplitude_error": metrics.relative_amplitude_error(outputs, wanted),
+    }

@@ -3,12 +3,12 @@
 from dataclasses import dataclass, field
 
 import numpy as np
-from scipy.stats import binomtest
 
 from mcmj.errors import DivergenceError
 from mcmj.experiments import limit_cycle
 from mcmj.generator import BodySettings
 from mcmj.progress import OnSteps
+from mcmj.rates import success_rate
 from mcmj.targets import TARGETS
 from mcmj.teaching import Teaching
 from mcmj.validation import Array, require_count, require_number
@@ -72,7 +72,7 @@ class Result:
         successes = {n: e < self.config.threshold for n, e in self.orbit_errors.items()}
         table: dict[str, object] = {
             name: {
-                **_rate(good),
+                **success_rate(good),
                 "median_orbit_error": float(np.median(self.orbit_errors[name])),
                 "median_period_error": float(np.median(self.period_errors[name])),
                 "orbit_errors": self.orbit_errors[name],
@@ -80,7 +80,7 @@ class Result:
             for name, good in successes.items()
         }
         table["best_seed"] = self.best_seed
-        table["all_tasks"] = _rate(np.logical_and.reduce(list(successes.values())))
+        table["all_tasks"] = success_rate(np.logical_and.reduce(list(successes.values())))
         return table
 
 
@@ -96,9 +96,3 @@ def run(config: Config, *, on_seeds: OnSteps = lambda seeds: None) -> Result:
                 period[name][index] = outcome.errors["period_error"]
         on_seeds(1)
     return Result(config, orbit, period)
-
-
-def _rate(good: np.ndarray) -> dict[str, object]:
-    count, total = int(good.sum()), len(good)
-    interval = binomtest(count, total).proportion_ci(method="wilson")
-    return {"successes": count, "of": total, "interval_95": [interval.low, interval.high]}

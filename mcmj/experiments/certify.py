@@ -1,0 +1,274 @@
+"""The report card of a trained body: how good its rhythm is, and how hard to destroy."""
+
+import os
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from threadpoolctl import threadpool_limits
+
+from mcmj import metrics
+from mcmj.body import Body
+from mcmj.errors import McmjError, UnknownNameError
+from mcmj.experiments import limit_cycle
+from mcmj.progress import OnSteps
+from mcmj.simulation import Simulation
+from mcmj.stability.basin import (
+    Survey,
+    kicked,
+    on_cycle,
+    pushed,
+    scaled_starts,
+    survey,
+)
+from mcmj.stability.confirm import monodromy_error, verdicts
+from mcmj.stability.cycle import Cycle, find_cycle
+from mcmj.stability.floquet import Complex, Floquet, floquet, target_multipliers
+from mcmj.stability.loop import ClosedLoop
+from mcmj.stability.lyapunov import Exponent, lyapunov_exponent
+from mcmj.stability.phase import Diffusion, phase_diffusion
+from mcmj.stability.tolerance import Tolerance, force_tolerance, noise_tolerance
+from mcmj.streams import stream
+from mcmj.targets import TARGETS, Target, target
+from mcmj.teaching import Teaching, synchronise, teach
+from mcmj.validation import Array, require_count, require_number
+
+STAGES = ("run", "floquet", "lyapunov", "phase", "starts", "kicks", "pushes", "force", "noise")
+
+
+@dataclass(frozen=True)
+class Config:
+    """What to certify.
+
+    Attributes:
+        task: van_der_pol, quadratic or lissajous.
+        body: a body file, or the name of a body that comes with mcmj; default: the general
+            body. If the file holds a readout for the task, nothing is taught.
+        seed: of all noise; with no body, of a new random body if given.
+        free_run: MuJoCo run whose last `window` the errors are of [s].
+        window: [s].
+        recovery: time to come back to the orbit [s].
+        threshold: largest orbit error of a recovery.
+        scales: of the target that the teacher starts the body with.
+        phases: at which it lets go, for each scale.
+        kicks: RMS velocity kicks, in units of the nodes' RMS speed on the cycle.
+        pushes: amplitudes F of random constant forces in [-F, F] for 1 s [N].
+        copies: of each kick and push, and of each step of the tolerances' bisections.
+        refine: steps so much smaller for a second after a kick, and during a push.
+        diffusion_noise: on the lengths, for the phase diffusion [m].
+        teaching: how the readout is taught, if it is.
+    """
+
+    task: str = "van_der_pol"
+    body: str | None = None
+    seed: int | None = None
+    free_run: float = 60.0
+    window: float = 20.0
+    recovery: float = 40.0
+    threshold: float = 0.05
+    scales: tuple[float, ...] = (0.0, 0.1, 0.25, 0.5, 0.75, 1.0, 1.25, 1.5, 2.0, 2.5, 3.0)
+    phases: int = 24
+    kicks: tuple[float, ...] = (0.25, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0)
+    pushes: tuple[float, ...] = (1.0, 3.0, 10.0, 30.0, 100.0, 300.0)
+    copies: int = 16
+    refine: int = 20
+    diffusion_noise: float = 1e-4
+    teaching: Teaching = field(default_factory=Teaching)
+
+    def __post_init__(self) -> None:
+        if self.task not in TARGETS:
+            raise UnknownNameError("task", self.task, TARGETS)
+        for name in ("recovery", "threshold", "diffusion_noise"):
+            require_number(name, getattr(self, name), 0.0, open_low=True)
+        require_number("window", self.window, 0.0, self.free_run, open_low=True)
+        for name, low in (("phases", 1), ("copies", 4), ("refine", 1)):
+            require_count(name, getattr(self, name), low)
+
+    @property
+    def noise_seed(self) -> int:
+        """The seed, or its default."""
+        return 0 if self.seed is None else self.seed
+
+    @property
+    def of_body(self) -> limit_cycle.Config:
+        """The limit-cycle experiment that has the same body."""
+        return limit_cycle.Config(task=self.task, body=self.body, seed=self.seed)
+
+
+@dataclass(frozen=True)
+class Result:
+    """The certificate.
+
+    Attributes:
+        errors: of the MuJoCo run, by name.
+        outputs: (T, n_outputs) of its last window.
+        floquet, target: multipliers of the body, and of the system it was taught (or None).
+        mujoco_monodromy_error: of the phase's and the leading direction, |D d - M d| / |d|.
+        starts, kicks, pushes: surveys of scales x phases, kicks x copies, pushes x copies.
+        start_outputs: (B, n_outputs) of the starts' states.
+        mujoco_agrees: of a sample of pushes: how many MuJoCo judges as the twin does, of how many.
+        force, force_fine: tolerance at the body's own step, and with `refine`.
+    """
+
+    config: Config
+    body: Body
+    target: Target
+    cycle: Cycle
+    errors: dict[str, float]
+    outputs: Array
+    floquet: Floquet
+    target_multipliers: Complex | None
+    mujoco_monodromy_error: float
+    exponent: Exponent
+    diffusion: Diffusion
+    starts: Survey
+    start_outputs: Array
+    kicks: Survey
+    pushes: Survey
+    mujoco_agrees: tuple[int, int]
+    force: Tolerance
+    force_fine: Tolerance
+    noise: Tolerance
+
+    @property
+    def metrics(self) -> dict[str, object]:
+        """As written to metrics.json; multipliers as [real, imaginary]."""
+        wanted = self.target_multipliers
+        return {
+            **self.errors,
+            "period": self.cycle.period,
+            "target_period": self.target.period,
+            "cycle_residual": self.cycle.residual,
+            "floquet_multipliers": _pairs(self.floquet.multipliers),
+            "floquet_multipliers_variational": _pairs(self.floquet.variational),
+            "floquet_disagreement": self.floquet.disagreement,
+            "phase_multiplier_error": abs(self.floquet.multipliers[0] - 1.0),
+            "leading_nontrivial": self.floquet.leading_nontrivial,
+            "mujoco_monodromy_error": self.mujoco_monodromy_error,
+            "target_multipliers": None if wanted is None else _pairs(wanted),
+            "target_leading_nontrivial": None if wanted is None else float(abs(wanted[1])),
+            "basin_fraction": self.starts.fraction,
+            "start_recovery_time": self.starts.median_time,
+            "kick_recovery": self.kicks.table(self.config.kicks),
+            "push_recovery": self.pushes.table(self.config.pushes),
+            "mujoco_pushes_agreeing": list(self.mujoco_agrees),
+            "lyapunov_exponent": self.exponent.value,
+            "lyapunov_spread": self.exponent.spread,
+            "phase_diffusion": self.diffusion.coefficient,
+            "phase_jitter_per_period": self.diffusion.jitter,
+            "phase_diffusion_noise": self.diffusion.noise,
+            "force_tolerance": self.force.value,
+            "force_tolerance_refined": self.force_fine.value,
+            "noise_tolerance": self.noise.value,
+        }
+
+
+def run(config: Config, *, on_stages: OnSteps = lambda stages: None) -> Result:
+    """Teach if need be, run in MuJoCo, and certify.
+
+    Raises:
+        DivergenceError: the free run blew up.
+        McmjError: the free run is not on the target's orbit: there is nothing to certify.
+    """
+    goal = target(config.task)
+    with threadpool_limits(1, "blas"):
+        loop, start, outputs, errors = _trained(config, goal)
+        if errors["orbit_error"] >= config.threshold:
+            raise McmjError(
+                f"the free run is off the orbit by {100 * errors['orbit_error']:.3g} % "
+                f"(threshold {100 * config.threshold:g} %): nothing to certify"
+            )
+        on_stages(1)
+        return _certified(config, goal, loop, start, outputs, errors, on_stages)
+
+
+def _trained(config: Config, goal: Target) -> tuple[ClosedLoop, Array, Array, dict[str, float]]:
+    """The loop, a state on the cycle, and the last window of a free run in MuJoCo."""
+    body, readouts, _ = limit_cycle.get_body(config.of_body)
+    simulation, w_out = Simulation(body), readouts.get(config.task)
+    if w_out is None:
+        w_out = teach(simulation, goal, config.teaching, config.noise_seed).w_out
+    else:
+        synchronise(simulation, goal, config.teaching.washout)
+        simulation.set_readout(w_out)
+    last = round(config.window / simulation.timestep)
+    simulation.rollout(max(1, round(config.free_run / simulation.timestep) - last), record=())
+    outputs = simulation.rollout(last, record=("outputs",)).get("outputs")
+    errors = {
+        "orbit_error": metrics.orbit_error(outputs, goal),
+        "period_error": metrics.relative_period_error(outputs, simulation.timestep, goal),
+        "amplitude_error": metrics.relative_amplitude_error(outputs, goal),
+    }
+    loop = ClosedLoop(body, w_out, simulation.timestep, threads=os.cpu_count() or 1)
+    return loop, loop.vector(simulation.state), outputs, errors
+
+
+def _certified(
+    config: Config,
+    goal: Target,
+    loop: ClosedLoop,
+    start: Array,
+    outputs: Array,
+    errors: dict[str, float],
+    on_stages: OnSteps,
+) -> Result:
+    seed, copies = config.noise_seed, config.copies
+    how: dict[str, Any] = {"threshold": config.threshold, "recovery": config.recovery, "seed": seed}
+    cycle = find_cycle(loop, start, goal.period)
+    analysis = floquet(loop, cycle)
+    confirmed = monodromy_error(loop, cycle, analysis)
+    on_stages(1)
+    exponent = lyapunov_exponent(
+        loop, cycle.state, interval=cycle.period, scale=cycle.scale, seed=seed
+    )
+    on_stages(1)
+    diffusion = phase_diffusion(loop, cycle, config.diffusion_noise, seed=seed)
+    on_stages(1)
+    begun = scaled_starts(
+        loop, goal, np.repeat(config.scales, config.phases),
+        np.tile(np.arange(config.phases) / config.phases, len(config.scales)),
+        duration=config.teaching.washout,
+    )  # fmt: skip
+    starts = _survey(config, loop, goal, begun)
+    on_stages(1)
+    generator = stream(seed, "initial_state")
+    hit = kicked(loop, cycle, np.repeat(config.kicks, copies), generator)
+    kicks = _survey(config, loop, goal, pushed(loop, hit, None, 1.0, refine=config.refine))
+    on_stages(1)
+    pushes, agrees = _pushes(config, goal, loop, cycle)
+    on_stages(1)
+    states = on_cycle(loop, cycle, copies)
+    force = force_tolerance(loop, goal, states, **how)
+    fine = force_tolerance(loop, goal, states, refine=config.refine, **how)
+    on_stages(1)
+    noise = noise_tolerance(loop, goal, states, **how)
+    on_stages(1)
+    return Result(
+        config, loop.body, goal, cycle, errors, outputs, analysis,
+        None if goal.rhs is None else target_multipliers(goal), confirmed, exponent, diffusion,
+        starts, loop.outputs(begun), kicks, pushes, agrees, force, fine, noise,
+    )  # fmt: skip
+
+
+def _survey(config: Config, loop: ClosedLoop, goal: Target, states: Array) -> Survey:
+    return survey(loop, goal, states, duration=config.recovery, threshold=config.threshold)
+
+
+def _pushes(
+    config: Config, goal: Target, loop: ClosedLoop, cycle: Cycle
+) -> tuple[Survey, tuple[int, int]]:
+    """The survey of pushes, and how many of one copy a strength MuJoCo judges alike."""
+    copies, nodes = config.copies, loop.body.n_nodes
+    strengths = np.repeat(config.pushes, copies)
+    pattern = stream(config.noise_seed, "forces").uniform(-1, 1, (len(strengths), nodes))
+    forces, states = strengths[:, None] * pattern, on_cycle(loop, cycle, len(strengths))
+    order = np.arange(len(strengths)).reshape(-1, copies).T.argsort(axis=None)
+    states = states[order]  # every strength at phases all over the cycle
+    result = _survey(config, loop, goal, pushed(loop, states, forces, 1.0, refine=config.refine))
+    some = slice(None, None, copies)
+    agreement = verdicts(loop, goal, states[some], forces[some], 1.0, config.recovery)
+    return result, agreement
+
+
+def _pairs(values: Complex) -> list[list[float]]:
+    return [[float(v.real), float(v.imag)] for v in values]
