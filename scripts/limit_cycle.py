@@ -12,7 +12,8 @@ from rich.table import Table
 
 from mcmj import plotting, store
 from mcmj.cli import Output, main
-from mcmj.experiments.limit_cycle import Config, Result, checkpoints, run, total_steps
+from mcmj.experiments.limit_cycle import Result, checkpoints, run
+from mcmj.experiments.limit_cycle_config import Config, total_steps
 from mcmj.mjcf import to_mjcf
 from mcmj.progress import progress_bar
 from mcmj.rendering import RenderingUnavailableError, limit_cycle_video

@@ -48,7 +48,7 @@ MUJOCO = {
     "engine",
     "experiments.benchmark",
     "experiments.full_scene",
-    "experiments.limit_cycle",  # reads the model of a body file
+    "experiments.limit_cycle_config",  # reads the model of a body file
     "experiments.loop_cost",  # times bare mj_step
     "laws",
     "leapfrog",

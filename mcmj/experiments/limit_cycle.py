@@ -2,93 +2,28 @@
 
 import hashlib
 import os
-import warnings
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from threading import Event
 
-import mujoco
 import numpy as np
 from threadpoolctl import threadpool_limits
 
 from mcmj import metrics
 from mcmj.body import Body
-from mcmj.bodyfile import (
-    body_of_model,
-    load_model,
-    provenance_of_model,
-    readout_of_model,
-    readouts_of_model,
-    spring_law_of_model,
-)
 from mcmj.checkpoint import Checkpoint
-from mcmj.errors import DivergenceError, InvalidArgumentError, McmjWarning, UnknownNameError
+from mcmj.errors import DivergenceError
+from mcmj.experiments.limit_cycle_config import Config, check_task, get_body
 from mcmj.experiments.loop_cost import closed_loop_cost
 from mcmj.freerun import free_run, resume, window_errors
-from mcmj.generator import BodySettings, draw_body
-from mcmj.library import body_path
-from mcmj.mjcf import DEFAULT_INTEGRATOR, to_mjcf
+from mcmj.mjcf import to_mjcf
 from mcmj.progress import OnSteps
 from mcmj.readout import Fit
 from mcmj.simulation import Simulation
-from mcmj.spring_laws import NATIVE
-from mcmj.targets import TARGETS, Target, target
-from mcmj.teaching import Teaching, synchronise, teach
-from mcmj.validation import Array, require_number
-
-
-@dataclass(frozen=True)
-class Config:
-    """What to run.
-
-    Attributes:
-        task: van_der_pol, quadratic, lissajous, or all three (by the same body).
-        body: a body file, or the name of a body that comes with mcmj; default: the general
-            body, unless a seed or changed settings ask for a new random one. If the file
-            holds a readout for the task, nothing is taught.
-        seed: of the random body and of the noise; default 0.
-        free_run: length of the free run in closed loop [s].
-        window: the errors are those of this last part of it [s].
-        timestep: control and physics step [s].
-        integrator: one of MuJoCo's.
-        settings: what a random body is drawn from.
-        teaching: how the readout is taught.
-    """
-
-    task: str = "all"
-    body: str | None = None
-    seed: int | None = None
-    free_run: float = 120.0
-    window: float = 20.0
-    timestep: float = 1e-3
-    integrator: str = DEFAULT_INTEGRATOR
-    settings: BodySettings = field(default_factory=BodySettings)
-    teaching: Teaching = field(default_factory=Teaching)
-
-    def __post_init__(self) -> None:
-        if self.task not in (*TARGETS, "all"):
-            raise UnknownNameError("task", self.task, [*TARGETS, "all"])
-        require_number("timestep", self.timestep, 0.0, open_low=True)
-        require_number("free_run", self.free_run, 0.0, open_low=True)
-        require_number("window", self.window, 0.0, self.free_run, open_low=True)
-        if self.body is not None and self.settings != BodySettings():
-            changed = [
-                k for k, v in asdict(BodySettings()).items() if getattr(self.settings, k) != v
-            ]
-            raise InvalidArgumentError(
-                ", ".join(changed), "no settings beside a body, which has its own", self.body
-            )
-
-    @property
-    def tasks(self) -> tuple[str, ...]:
-        """Names of the targets to learn."""
-        return tuple(TARGETS) if self.task == "all" else (self.task,)
-
-    @property
-    def noise_seed(self) -> int:
-        """The seed, or its default."""
-        return 0 if self.seed is None else self.seed
+from mcmj.targets import Target, target
+from mcmj.teaching import synchronise, teach
+from mcmj.validation import Array
 
 
 @dataclass(frozen=True)
@@ -138,38 +73,6 @@ class Result:
         table["steps_per_second"] = self.steps_per_second
         table["closed_loop_cost_ratio"] = self.closed_loop_cost_ratio
         return table
-
-
-def get_body(config: Config) -> tuple[Body, dict[str, Array], dict[str, object]]:
-    """The config's body, the readouts that came with it, and where it comes from."""
-    if config.body is None and (config.seed is not None or config.settings != BodySettings()):
-        body = draw_body(config.noise_seed, config.settings)
-        return body, {}, {"seed": config.noise_seed, "settings": asdict(config.settings)}
-    model = load_model(body_path(config.body or "general"))
-    _warn_if_other_physics(config, model)
-    body, readouts = body_of_model(model), readouts_of_model(model)
-    active = readout_of_model(model)
-    if not readouts and active is not None and config.task != "all":
-        readouts = {config.task: active}
-    return body, readouts, provenance_of_model(model) or {}
-
-
-def _warn_if_other_physics(config: Config, model: mujoco.MjModel) -> None:
-    """A file may have been written for another step, integrator or spring law than is run."""
-    springs, step = spring_law_of_model(model), float(model.opt.timestep)
-    if springs != NATIVE or step != config.timestep:
-        warnings.warn(
-            f"the body file was written for {1e3 * step:g} ms and {springs} springs; this run "
-            f"takes {1e3 * config.timestep:g} ms, {config.integrator} and native springs",
-            McmjWarning,
-            stacklevel=2,
-        )
-
-
-def total_steps(config: Config) -> int:
-    """Control steps of a whole run, for a progress bar."""
-    seconds = config.teaching.duration + config.free_run
-    return len(config.tasks) * round(seconds / config.timestep)
 
 
 def checkpoints(config: Config, folder: Path) -> dict[str, Checkpoint]:
@@ -243,24 +146,6 @@ def run_tasks(
         except BaseException:
             stopped.set()  # the other tasks end with their chunk
             raise
-
-
-def check_task(config: Config, body: Body, wanted: Target) -> None:
-    """Check that a body has the channels, and the window the length, that a target needs.
-
-    Raises:
-        InvalidArgumentError: one of them does not.
-    """
-    if body.n_outputs != wanted.n_outputs:
-        raise InvalidArgumentError(
-            "body", f"{wanted.n_outputs} feedback channels for {wanted.name}", body.n_outputs
-        )
-    if config.window < metrics.PERIODS_NEEDED * wanted.period:
-        raise InvalidArgumentError(
-            "window",
-            f"at least {metrics.PERIODS_NEEDED} periods of {wanted.period:.4g} s ({wanted.name})",
-            f"{config.window:g} s",
-        )
 
 
 def _run_task(
