@@ -11,11 +11,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from mcmj.body import Body
+from mcmj.bodyfile import from_mjcf
 from mcmj.errors import DivergenceError, InvalidArgumentError, UnknownNameError
 from mcmj.experiments.attractor import attractor_errors
 from mcmj.experiments.named_methods import METHODS, final_state, stepping
 from mcmj.experiments.orders import Order, observed_order
 from mcmj.generator import random_body
+from mcmj.library import body_path
 from mcmj.reference import integrate
 from mcmj.streams import stream
 from mcmj.timing import interleaved_seconds
@@ -51,7 +53,7 @@ class Config:
         force: constant horizontal forces are uniform in +-force [N].
         seed: of bodies, forces and speeds.
         repeats: rounds of the cost measurement, of which the median counts.
-        attractor: also run learned rhythms under other integrators than they were taught under.
+        attractor: also run the general body's rhythms under other integrators than taught under.
     """
 
     bodies: tuple[str, ...] = tuple(BODIES)
@@ -161,7 +163,7 @@ def run(config: Config, *, on_bodies: Callable[[int], object] = lambda bodies: N
     orders = {m: observed_order(cells, m) for m in config.methods}
     attractor = {}
     if config.attractor:
-        attractor = attractor_errors(random_body(config.seed), seed=config.seed)
+        attractor = attractor_errors(from_mjcf(body_path("general"))[0], seed=0)
     return Result(config, cells, orders, consistency, attractor)
 
 
