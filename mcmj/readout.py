@@ -7,7 +7,7 @@ from scipy.linalg import svd
 from threadpoolctl import threadpool_limits
 
 from mcmj.errors import InvalidArgumentError
-from mcmj.validation import Array, as_array, require_number
+from mcmj.validation import Array, as_array, require_above, require_number
 
 
 @dataclass(frozen=True)
@@ -54,22 +54,28 @@ class Regression:
         self._mean = np.zeros(0)  # of the targets, and their summed squares about it
         self._scatter = 0.0
 
-    def add(self, lengths: Array, targets: Array, *, weight: float = 1.0) -> None:
+    @property
+    def weight(self) -> float:
+        """Sum of the weights of all rows so far: their number where every weight is 1."""
+        return self._weight
+
+    def add(self, lengths: Array, targets: Array, *, weight: float | Array = 1.0) -> None:
         """Fold in samples: lengths (M, L) and targets (M, n_outputs).
 
         Args:
-            weight: of their squared errors, > 0.
+            weight: of their squared errors, > 0: a number, or (M,).
 
         Raises:
             InvalidArgumentError: wrong shapes, NaN, or a weight that is not positive.
         """
-        require_number("weight", weight, 0.0, open_low=True)
         x = as_array("lengths", lengths, (None, None))
         y = as_array("targets", targets, (len(x), None))
+        weights = as_array("weight", np.broadcast_to(weight, len(x)), (len(x),))
+        require_above("weight", weights, 0.0)
         ones = np.ones((len(x), int(self._bias)))
         block = np.hstack([ones, x, y])
-        if weight != 1.0:
-            block *= np.sqrt(weight)
+        if (weights != 1.0).any():
+            block *= np.sqrt(weights)[:, None]
         if self._factor is None:
             self._n_lengths = x.shape[1]
             self._factor = np.zeros((0, block.shape[1]))
@@ -82,17 +88,17 @@ class Regression:
         with threadpool_limits(1, "blas"):  # the same bits on any number of cores
             self._factor = np.asarray(np.linalg.qr(stacked, mode="r"))
         self._rows += len(y)
-        self._count(y, weight)
+        self._count(y, weights)
 
-    def _count(self, y: Array, weight: float) -> None:
+    def _count(self, y: Array, weights: Array) -> None:
         """Merge mean and scatter of new targets (Chan et al. 1979): large means do no harm."""
-        before, new = self._weight, weight * len(y)
+        before, new = self._weight, float(weights.sum())
         if new == 0:
             return
-        mean = y.mean(axis=0)
+        mean = np.average(y, axis=0, weights=weights)
         shift = mean - self._mean
         self._weight = before + new
-        scatter = weight * ((y - mean) ** 2).sum()
+        scatter = (weights[:, None] * (y - mean) ** 2).sum()
         self._scatter += scatter + (shift**2).sum() * before * new / self._weight
         self._mean = self._mean + shift * new / self._weight
 

@@ -1,16 +1,19 @@
 """Teacher forcing: the target is fed back in place of the outputs, and the readout is fitted."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from mcmj.errors import InvalidArgumentError
+from mcmj.progress import OnSteps
 from mcmj.readout import Fit, Regression
 from mcmj.simulation import CHUNK, Simulation
 from mcmj.streams import stream
 from mcmj.targets import Target
-from mcmj.validation import require_count, require_number
+from mcmj.validation import Array, require_count, require_number
+
+Signal = Callable[[Array], Array]  # times (T,) [s] -> (T, n)
 
 
 @dataclass(frozen=True)
@@ -57,13 +60,36 @@ class Teaching:
             require_number(name, getattr(self, name), 0.0, open_low=True)
 
 
+@dataclass(frozen=True)
+class Lesson:
+    """A stretch of teacher forcing: what is fed back, and what the readout is to say then.
+
+    Signals are functions of the simulation's time, which is 0 where a lesson starts from rest.
+
+    Attributes:
+        outputs: times (T,) [s] -> (T, n_outputs).
+        duration: washout included [s].
+        washout: start of it that the regression leaves out [s].
+        inputs: times (T,) [s] -> (T, n_inputs); None: no input.
+        weight: of the squared errors, a number or times (T,) [s] -> (T,).
+        from_rest: begin at total rest and time 0, and leave the simulation as it was.
+    """
+
+    outputs: Signal
+    duration: float
+    washout: float = 0.0
+    inputs: Signal | None = None
+    weight: float | Signal = 1.0
+    from_rest: bool = False
+
+
 def teach(
     simulation: Simulation,
     target: Target,
     teaching: Teaching,
     seed: int,
     *,
-    on_steps: Callable[[int], object] = lambda steps: None,
+    on_steps: OnSteps = lambda steps: None,
 ) -> Fit:
     """Teach a target to a body by teacher forcing, then close the loop with the readout.
 
@@ -78,43 +104,75 @@ def teach(
     Raises:
         DivergenceError: the body blew up under the teacher.
     """
-    noise, length_noise = stream(seed, "teacher_noise"), stream(seed, "length_noise")
-    step = simulation.timestep
-    total, washout = round(teaching.duration / step), round(teaching.washout / step)
+    start = Lesson(
+        target.sample, teaching.rest_duration, weight=teaching.rest_weight, from_rest=True
+    )
+    cycle = Lesson(target.sample, teaching.duration, teaching.washout)
+    lessons = [*[start] * teaching.rest_runs, cycle]
+    return teach_lessons(simulation, lessons, teaching, seed, on_steps=on_steps)
+
+
+def teach_lessons(
+    simulation: Simulation,
+    lessons: Sequence[Lesson],
+    teaching: Teaching,
+    seed: int,
+    *,
+    on_steps: OnSteps = lambda steps: None,
+) -> Fit:
+    """One readout fitted to several lessons together; the simulation then runs it.
+
+    Args:
+        teaching: noise, ridge and bias; durations are the lessons' own.
+        seed, on_steps: as for `teach`.
+
+    Raises:
+        DivergenceError: the body blew up under the teacher.
+    """
+    noises = {name: stream(seed, name) for name in ("teacher_noise", "rest_noise", "length_noise")}
     regression = Regression(bias=teaching.bias)
-    if teaching.rest_runs:
-        _teach_from_rest(simulation, target, teaching, seed, regression)
-    start_step = round(simulation.time / step)
-    for start in range(0, total, CHUNK):
-        steps = np.arange(start, min(start + CHUNK, total))
-        clean = target.sample((start_step + steps) * step)
-        noisy = clean + teaching.noise * noise.standard_normal(clean.shape)
-        rollout = simulation.rollout(offset=noisy, gate=0.0, record=("lengths",))
-        lengths = rollout.get("lengths")
-        if teaching.length_noise > 0:
-            lengths = lengths + teaching.length_noise * length_noise.standard_normal(lengths.shape)
-        learned = steps >= washout
-        if learned.any():
-            regression.add(lengths[learned], clean[learned])
-        on_steps(len(steps))
-    fit = regression.solve(ridge=teaching.ridge_per_row * (total - washout))
+    for lesson in lessons:
+        before = simulation.snapshot()
+        if lesson.from_rest:
+            simulation.reset()
+        _follow(simulation, lesson, teaching, noises, regression, on_steps)
+        if lesson.from_rest:
+            simulation.restore(before)
+    fit = regression.solve(ridge=teaching.ridge_per_row * regression.weight)
     simulation.set_readout(fit.w_out)
     return fit
 
 
-def _teach_from_rest(
-    simulation: Simulation, target: Target, teaching: Teaching, seed: int, regression: Regression
+def _follow(
+    simulation: Simulation,
+    lesson: Lesson,
+    teaching: Teaching,
+    noises: dict[str, np.random.Generator],
+    regression: Regression,
+    on_steps: OnSteps,
 ) -> None:
-    """Fold in runs of teacher forcing from total rest; the simulation is left as it was."""
-    noise, start = stream(seed, "rest_noise"), simulation.snapshot()
+    """Fold a lesson into the regression."""
     step = simulation.timestep
-    clean = target.sample(np.arange(round(teaching.rest_duration / step)) * step)
-    for _ in range(teaching.rest_runs):
+    total, washout = round(lesson.duration / step), round(lesson.washout / step)
+    first = round(simulation.time / step)
+    noise = noises["rest_noise" if lesson.from_rest else "teacher_noise"]
+    for start in range(0, total, CHUNK):
+        steps = np.arange(start, min(start + CHUNK, total))
+        times = step * (first + steps).astype(np.float64)
+        clean = lesson.outputs(times)
         noisy = clean + teaching.noise * noise.standard_normal(clean.shape)
-        simulation.reset()
-        rollout = simulation.rollout(offset=noisy, gate=0.0, record=("lengths",))
-        regression.add(rollout.get("lengths"), clean, weight=teaching.rest_weight)
-    simulation.restore(start)
+        inputs = None if lesson.inputs is None else lesson.inputs(times)
+        rollout = simulation.rollout(inputs=inputs, offset=noisy, gate=0.0, record=("lengths",))
+        lengths = rollout.get("lengths")
+        if teaching.length_noise > 0:
+            seen = noises["length_noise"].standard_normal(lengths.shape)
+            lengths = lengths + teaching.length_noise * seen
+        learned = steps >= washout
+        if learned.any():
+            weight = lesson.weight
+            weights = weight(times[learned]) if callable(weight) else weight
+            regression.add(lengths[learned], clean[learned], weight=weights)
+        on_steps(len(steps))
 
 
 def synchronise(simulation: Simulation, target: Target, duration: float) -> None:

@@ -131,7 +131,9 @@ class Result:
 
 def total_steps(config: Config) -> int:
     """Control steps of a whole run, for a progress bar."""
-    seconds = config.teaching.duration + config.free_run
+    teaching = config.teaching
+    taught = teaching.duration + teaching.rest_runs * teaching.rest_duration
+    seconds = taught + config.free_run
     return config.seeds * len(config.of_seed(0).tasks) * round(seconds / config.timestep)
 
 
