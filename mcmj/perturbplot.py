@@ -102,16 +102,17 @@ def tolerance_figure(amplitudes: Sequence[float], errors: Array, tolerance: floa
     return figure
 
 
-def swing_up_figure(runs: Mapping[str, tuple[Target, Array, Array, float, float]]) -> Figure:
+def swing_up_figure(runs: Mapping[str, tuple[Target, float, Array, float, float]]) -> Figure:
     """Fig. 7: from rest onto the orbit; outputs over time and the phase plane, a row a task.
 
     Args:
-        runs: by task: target, times (T,) [s], outputs (T, 2), orbit error, swing-up time [s].
+        runs: by task: target, timestep [s], outputs (T, 2), orbit error, swing-up time [s].
     """
     figure = new_figure(12.0, 2.7 * len(runs) + 0.5)
     axes = figure.subplots(len(runs), 2, width_ratios=[3.0, 1.0], squeeze=False)
     for (name, run), (time_axes, plane) in zip(runs.items(), axes, strict=True):
-        target, times, outputs, error, swing_up = run
+        target, timestep, outputs, error, swing_up = run
+        times = timestep * np.arange(len(outputs))
         orbit = target.orbit(ORBIT_POINTS)
         plane.plot(*orbit[np.r_[:ORBIT_POINTS, 0]].T, color=TARGET_COLOUR, lw=3.5, alpha=0.55)
         arrived = np.isfinite(swing_up)

@@ -1,6 +1,7 @@
 """Teacher forcing: the target is fed back in place of the outputs, and the readout is fitted."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable
+from copy import copy
 from dataclasses import dataclass
 
 import numpy as np
@@ -32,8 +33,8 @@ class Teaching:
         rest_runs: number of runs taught from total rest, without washout, beside the one
             above; they teach the body to swing up.
         rest_duration: of each of them [s]; the target starts at time 0 at full size.
-        rest_weight: of their squared errors, against 1. Tiny, for a linear readout cannot
-            serve both well: at 0.01 it already loses the cycle.
+        rest_weight: of their squared errors, against 1. Small, for a linear readout cannot
+            serve both well.
     """
 
     duration: float = 120.0
@@ -73,6 +74,7 @@ class Lesson:
         inputs: times (T,) [s] -> (T, n_inputs); None: no input.
         weight: of the squared errors, a number or times (T,) [s] -> (T,).
         from_rest: begin at total rest and time 0, and leave the simulation as it was.
+        own_share: s in [0, 1]: s y + (1 - s) y* + noise is fed back, y the body's own outputs.
     """
 
     outputs: Signal
@@ -81,6 +83,12 @@ class Lesson:
     inputs: Signal | None = None
     weight: float | Signal = 1.0
     from_rest: bool = False
+    own_share: float = 0.0
+
+    def __post_init__(self) -> None:
+        require_number("duration", self.duration, 0.0, open_low=True)
+        require_number("washout", self.washout, 0.0)
+        require_number("own_share", self.own_share, 0.0, 1.0)
 
 
 def teach(
@@ -104,17 +112,14 @@ def teach(
     Raises:
         DivergenceError: the body blew up under the teacher.
     """
-    start = Lesson(
-        target.sample, teaching.rest_duration, weight=teaching.rest_weight, from_rest=True
+    return teach_lessons(
+        simulation, lessons_of(target, teaching), teaching, seed, on_steps=on_steps
     )
-    cycle = Lesson(target.sample, teaching.duration, teaching.washout)
-    lessons = [*[start] * teaching.rest_runs, cycle]
-    return teach_lessons(simulation, lessons, teaching, seed, on_steps=on_steps)
 
 
 def teach_lessons(
     simulation: Simulation,
-    lessons: Sequence[Lesson],
+    lessons: Iterable[Lesson],
     teaching: Teaching,
     seed: int,
     *,
@@ -129,50 +134,93 @@ def teach_lessons(
     Raises:
         DivergenceError: the body blew up under the teacher.
     """
-    noises = {name: stream(seed, name) for name in ("teacher_noise", "rest_noise", "length_noise")}
-    regression = Regression(bias=teaching.bias)
+    course = Course(simulation, teaching, seed)
     for lesson in lessons:
-        before = simulation.snapshot()
-        if lesson.from_rest:
-            simulation.reset()
-        _follow(simulation, lesson, teaching, noises, regression, on_steps)
-        if lesson.from_rest:
-            simulation.restore(before)
-    fit = regression.solve(ridge=teaching.ridge_per_row * regression.weight)
-    simulation.set_readout(fit.w_out)
-    return fit
+        course.attend(lesson, on_steps=on_steps)
+    return course.fit()
 
 
-def _follow(
-    simulation: Simulation,
-    lesson: Lesson,
-    teaching: Teaching,
-    noises: dict[str, np.random.Generator],
-    regression: Regression,
-    on_steps: OnSteps,
-) -> None:
-    """Fold a lesson into the regression."""
-    step = simulation.timestep
-    total, washout = round(lesson.duration / step), round(lesson.washout / step)
-    first = round(simulation.time / step)
-    noise = noises["rest_noise" if lesson.from_rest else "teacher_noise"]
-    for start in range(0, total, CHUNK):
-        steps = np.arange(start, min(start + CHUNK, total))
-        times = step * (first + steps).astype(np.float64)
-        clean = lesson.outputs(times)
-        noisy = clean + teaching.noise * noise.standard_normal(clean.shape)
-        inputs = None if lesson.inputs is None else lesson.inputs(times)
-        rollout = simulation.rollout(inputs=inputs, offset=noisy, gate=0.0, record=("lengths",))
-        lengths = rollout.get("lengths")
-        if teaching.length_noise > 0:
-            seen = noises["length_noise"].standard_normal(lengths.shape)
-            lengths = lengths + teaching.length_noise * seen
-        learned = steps >= washout
-        if learned.any():
-            weight = lesson.weight
-            weights = weight(times[learned]) if callable(weight) else weight
-            regression.add(lengths[learned], clean[learned], weight=weights)
-        on_steps(len(steps))
+def lessons_of(target: Target, teaching: Teaching) -> list[Lesson]:
+    """What `teaching` asks for: the runs from rest, then the one on the cycle."""
+    from_rest = Lesson(
+        target.sample, teaching.rest_duration, weight=teaching.rest_weight, from_rest=True
+    )
+    on_cycle = Lesson(target.sample, teaching.duration, teaching.washout)
+    return [*[from_rest] * teaching.rest_runs, on_cycle]
+
+
+class Course:
+    """A body being taught: lessons are folded in one by one, a readout fitted at any time.
+
+    Args:
+        simulation: the body; its state carries over from lesson to lesson.
+        teaching: noise, ridge and bias; durations are the lessons' own.
+        seed: of the noise streams.
+    """
+
+    def __init__(self, simulation: Simulation, teaching: Teaching, seed: int) -> None:
+        self._simulation, self._teaching = simulation, teaching
+        self._regression = Regression(bias=teaching.bias)
+        self._noise = stream(seed, "teacher_noise")
+        self._rest_noise = stream(seed, "rest_noise")
+        self._length_noise = stream(seed, "length_noise")
+
+    def fit(self) -> Fit:
+        """The readout that serves all lessons so far best; the simulation runs it from now on."""
+        ridge = self._teaching.ridge_per_row * self._regression.weight
+        fit = self._regression.solve(ridge=ridge)
+        self._simulation.set_readout(fit.w_out)
+        return fit
+
+    def attend(self, lesson: Lesson, *, on_steps: OnSteps = lambda steps: None) -> None:
+        """Run a lesson and fold it in; memory does not grow with its duration.
+
+        Raises:
+            DivergenceError: the body blew up; nothing of the lesson is then folded in.
+        """
+        before = self._simulation.snapshot()
+        if lesson.from_rest:
+            self._simulation.reset()
+        learnt = copy(self._regression)
+        try:
+            self._follow(lesson, learnt, on_steps)
+        finally:
+            if lesson.from_rest:
+                self._simulation.restore(before)
+        self._regression = learnt
+
+    def _follow(self, lesson: Lesson, regression: Regression, on_steps: OnSteps) -> None:
+        step = self._simulation.timestep
+        total, washout = round(lesson.duration / step), round(lesson.washout / step)
+        first = round(self._simulation.time / step)
+        for start in range(0, total, CHUNK):
+            steps = np.arange(start, min(start + CHUNK, total))
+            times = step * (first + steps).astype(np.float64)
+            clean = lesson.outputs(times)
+            lengths = self._lengths(lesson, times, clean)
+            learned = steps >= washout
+            if learned.any():
+                weight = lesson.weight
+                weights = weight(times[learned]) if callable(weight) else weight
+                regression.add(lengths[learned], clean[learned], weight=weights)
+            on_steps(len(steps))
+
+    def _lengths(self, lesson: Lesson, times: Array, clean: Array) -> Array:
+        """Lengths (T, L) under the teacher, as the readout sees them."""
+        noise = self._rest_noise if lesson.from_rest else self._noise
+        noisy = (1.0 - lesson.own_share) * clean
+        noisy += self._teaching.noise * noise.standard_normal(clean.shape)
+        run = self._simulation.rollout(
+            inputs=None if lesson.inputs is None else lesson.inputs(times),
+            offset=noisy,
+            gate=lesson.own_share,
+            record=("lengths",),
+        )
+        lengths = run.get("lengths")
+        if self._teaching.length_noise > 0:
+            seen = self._length_noise.standard_normal(lengths.shape)
+            lengths = lengths + self._teaching.length_noise * seen
+        return lengths
 
 
 def synchronise(simulation: Simulation, target: Target, duration: float) -> None:

@@ -18,7 +18,7 @@ def work(config: Config, output: Output, out: Path) -> None:
         result = run(config, on_steps=on_steps)
     first, seed = result.bodies[0], config.of_seed(0).noise_seed
     runs = {
-        name: (t.target, t.times, t.outputs, t.orbit_error, t.swing_up_time)
+        name: (t.target, config.timestep, t.outputs, t.orbit_error, t.swing_up_time)
         for name, t in first.items()
     }
     save(swing_up_figure(runs), out / "swing_up.png")
@@ -32,10 +32,17 @@ def work(config: Config, output: Output, out: Path) -> None:
 def show(result: Result, out: Path) -> None:
     config = result.config
     table = Table(title=f"{config.free_run:g} s from total rest")
-    for column in ("task", "orbit error", "swing-up time"):
+    for column in ("task", "orbit error", "swing-up time", "rounds of practice", "kicked starts"):
         table.add_column(column, justify="left" if column == "task" else "right")
     for name, task in result.bodies[0].items():
-        table.add_row(name, f"{100 * task.orbit_error:.3f} %", f"{task.swing_up_time:.2f} s")
+        kicked = task.kicked_fraction
+        table.add_row(
+            name,
+            f"{100 * task.orbit_error:.3f} %",
+            f"{task.swing_up_time:.2f} s",
+            str(max(0, len(task.practice_errors) - 1)),
+            "none" if kicked is None else f"{100 * kicked:.0f} % arrive",
+        )
     console = Console()
     console.print(table)
     if config.seeds > 1:

@@ -8,6 +8,7 @@ from mcmj.errors import DivergenceError, InvalidArgumentError, UnknownNameError
 from mcmj.experiments import perturb, swing_up
 from mcmj.generator import BodySettings
 from mcmj.metrics import orbit_distances, recovery_time
+from mcmj.practice import Practice, practise
 from mcmj.rates import success_rate
 from mcmj.readout import Regression
 from mcmj.simulation import Simulation
@@ -155,24 +156,33 @@ def test_wrong_configurations_are_refused(wrong):
         perturb.Config(**wrong)
 
 
+SWING = swing_up.Config(
+    task="quadratic", seed=0, free_run=20.0, window=12.0, engine="twin", kicks=2,
+    settings=BodySettings(nodes=12),
+    teaching=Teaching(duration=30.0, washout=10.0, rest_runs=1),
+    practice=Practice(rounds=2, round_duration=5.0, trial=20.0, trial_window=12.0),
+)  # fmt: skip
+
+
 def test_swing_up_starts_from_total_rest_and_is_measured_as_said():
-    config = swing_up.Config(
-        task="quadratic", seed=0, free_run=20.0, window=12.0, engine="twin",
-        settings=BodySettings(nodes=12),
-        teaching=Teaching(duration=30.0, washout=10.0, rest_runs=1),
-    )  # fmt: skip
-    (tasks,) = swing_up.run(config).bodies
+    (tasks,) = swing_up.run(SWING).bodies
     run = tasks["quadratic"]
-    body, _, _ = swing_up.limit_cycle.get_body(config.of_seed(0))
-    taught = Simulation(body)
-    fit = teach(taught, run.target, config.teaching, 0)
+    body, _, _ = swing_up.limit_cycle.get_body(SWING.of_seed(0))
+    taught = Simulation(body, engine="twin")
+    fit = practise(taught, run.target, SWING.teaching, SWING.practice, 0).fit
     np.testing.assert_allclose(run.outputs[0], body.rest_lengths @ fit.w_out, atol=1e-5)
     assert run.swing_up_time == recovery_time(run.outputs, 1e-3, run.target)
-    again = swing_up.run(config)
+    assert run.orbit_error == min(run.practice_errors)  # trials are runs like this one here
+    assert run.kicked_fraction in (0.0, 0.5, 1.0)
+    again = swing_up.run(SWING)
     assert np.array_equal(again.bodies[0]["quadratic"].outputs, run.outputs)
     assert again.metrics["orbit_error"] == run.orbit_error
+
+
+@pytest.mark.parametrize("wrong", [{"seeds": 0}, {"kicks": -1}, {"kick_speed": np.nan}])
+def test_wrong_swing_ups_are_refused(wrong):
     with pytest.raises(InvalidArgumentError):
-        swing_up.Config(seeds=0)
+        swing_up.Config(**wrong)
 
 
 @pytest.mark.slow

@@ -1,14 +1,10 @@
 """Fig. 5: one body learns a limit cycle by teacher forcing, then runs free in MuJoCo."""
 
 import hashlib
-import os
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
-from threading import Event
 
 import numpy as np
-from threadpoolctl import threadpool_limits
 
 from mcmj import metrics
 from mcmj.body import Body
@@ -23,6 +19,7 @@ from mcmj.readout import Fit
 from mcmj.simulation import Simulation
 from mcmj.targets import Target, target
 from mcmj.teaching import synchronise, teach
+from mcmj.threads import in_threads
 from mcmj.validation import Array
 
 
@@ -121,31 +118,19 @@ def run_tasks(
     """
     body, readouts, _ = get_body(config)
     kept = {} if folder is None else checkpoints(config, folder)
-    stopped = Event()
     targets = {name: target(name) for name in config.tasks}
     for wanted in targets.values():
         check_task(config, body, wanted)
 
-    def on_part(steps: int) -> None:
-        if stopped.is_set():
-            raise InterruptedError
-        on_steps(steps)
-
-    def outcome(name: str) -> TaskResult | DivergenceError:
+    def outcome(name: str, report: OnSteps) -> TaskResult | DivergenceError:
         try:
             return _run_task(
-                config, body, targets[name], readouts.get(name), kept.get(name), on_part
+                config, body, targets[name], readouts.get(name), kept.get(name), report
             )
         except DivergenceError as error:
             return error
 
-    # rollouts release the GIL; BLAS threads on top would wait for each other
-    with threadpool_limits(1, "blas"), ThreadPoolExecutor(os.cpu_count()) as pool:
-        try:
-            return dict(zip(targets, pool.map(outcome, targets), strict=True))
-        except BaseException:
-            stopped.set()  # the other tasks end with their chunk
-            raise
+    return dict(zip(targets, in_threads(outcome, list(targets), on_steps), strict=True))
 
 
 def _run_task(

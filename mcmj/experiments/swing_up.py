@@ -9,12 +9,17 @@ from mcmj.body import Body
 from mcmj.errors import DivergenceError
 from mcmj.experiments import limit_cycle
 from mcmj.generator import BodySettings
+from mcmj.practice import Practice, practise
 from mcmj.progress import OnSteps
 from mcmj.rates import success_rate
 from mcmj.simulation import Simulation
+from mcmj.streams import stream
 from mcmj.targets import Target, target
-from mcmj.teaching import Teaching, teach
+from mcmj.teaching import Teaching
+from mcmj.threads import in_threads
 from mcmj.validation import Array, require_count, require_number
+
+TAUGHT = Teaching(duration=240.0, rest_runs=2, rest_duration=30.0, rest_weight=1e-2)
 
 
 @dataclass(frozen=True)
@@ -33,8 +38,13 @@ class Config:
             success.
         timestep: control and physics step [s].
         engine: mujoco, or twin: faster, the same to rounding.
+        kicks: number of further starts, with the nodes kicked, that show how wide the way
+            onto the orbit is; 0: none.
+        kick_speed: standard deviation of their first velocities [m/s]; on the orbit nodes move
+            at about 0.05 m/s.
         settings: what a random body is drawn from.
-        teaching: how the readout is taught; some runs from rest help.
+        teaching: how the readout is taught, runs from rest included.
+        practice: how the body then practises from rest.
     """
 
     task: str = "all"
@@ -46,11 +56,16 @@ class Config:
     tolerance: float = 0.05
     timestep: float = 1e-3
     engine: str = "mujoco"
+    kicks: int = 8
+    kick_speed: float = 0.02
     settings: BodySettings = field(default_factory=BodySettings)
-    teaching: Teaching = field(default_factory=lambda: Teaching(rest_runs=3))
+    teaching: Teaching = field(default_factory=lambda: TAUGHT)
+    practice: Practice = field(default_factory=Practice)
 
     def __post_init__(self) -> None:
         require_count("seeds", self.seeds, 1)
+        require_count("kicks", self.kicks, 0)
+        require_number("kick_speed", self.kick_speed, 0.0)
         require_number("tolerance", self.tolerance, 0.0, open_low=True)
         self.of_seed(0)  # checks the rest
 
@@ -74,17 +89,20 @@ class SwingUp:
     """One task of one body.
 
     Attributes:
-        times, outputs: (T,) [s] and (T, n_outputs) from rest; empty if it blew up.
+        outputs: (T, n_outputs) from rest, one every timestep; empty if it blew up.
         orbit_error: of the last part; infinite if it blew up.
         swing_up_time: until the outputs stay within the tolerance of the orbit [s], infinite
             if they do not.
+        practice_errors: of the trials, see mcmj.practice; empty if teaching blew up.
+        kicked_fraction: of the kicked starts, that came to the orbit; None without any.
     """
 
     target: Target
-    times: Array
     outputs: Array
     orbit_error: float
     swing_up_time: float
+    practice_errors: tuple[float, ...]
+    kicked_fraction: float | None
 
 
 @dataclass(frozen=True)
@@ -102,7 +120,12 @@ class Result:
             "orbit_error": max(task.orbit_error for task in first.values()),
             "swing_up_time": max(task.swing_up_time for task in first.values()),
             "tasks": {
-                name: {"orbit_error": task.orbit_error, "swing_up_time": task.swing_up_time}
+                name: {
+                    "orbit_error": task.orbit_error,
+                    "swing_up_time": task.swing_up_time,
+                    "practice_errors": task.practice_errors,
+                    "kicked_fraction": task.kicked_fraction,
+                }
                 for name, task in first.items()
             },
         }
@@ -113,27 +136,35 @@ class Result:
     @property
     def rates(self) -> dict[str, dict[str, object]]:
         """How many bodies swing up, by task and on all tasks."""
-        errors = {n: [body[n].orbit_error for body in self.bodies] for n in self.bodies[0]}
-        good = {name: np.array(e) < self.config.tolerance for name, e in errors.items()}
-        table = {
-            name: {
-                **success_rate(good[name]),
-                "median_swing_up_time": float(
-                    np.median([body[name].swing_up_time for body in self.bodies])
-                ),
-                "orbit_errors": errors[name],
-            }
-            for name in errors
-        }
-        table["all_tasks"] = success_rate(np.logical_and.reduce(list(good.values())))
+        by_task = {name: [body[name] for body in self.bodies] for name in self.bodies[0]}
+        table = {name: self._rate(runs) for name, runs in by_task.items()}
+        good = [
+            all(run.orbit_error < self.config.tolerance for run in body.values())
+            for body in self.bodies
+        ]
+        table["all_tasks"] = success_rate(good)
         return table
+
+    def _rate(self, runs: list[SwingUp]) -> dict[str, object]:
+        tolerance = self.config.tolerance
+        firsts = [run.practice_errors[0] if run.practice_errors else np.inf for run in runs]
+        kicked = [run.kicked_fraction for run in runs if run.kicked_fraction is not None]
+        return {
+            **success_rate([run.orbit_error < tolerance for run in runs]),
+            "without_practice": success_rate([error < tolerance for error in firsts]),
+            "median_swing_up_time": float(np.median([run.swing_up_time for run in runs])),
+            "mean_kicked_fraction": float(np.mean(kicked)) if kicked else None,
+            "orbit_errors": [run.orbit_error for run in runs],
+            "rounds": [max(0, len(run.practice_errors) - 1) for run in runs],
+            "kicked_fractions": kicked,
+        }
 
 
 def total_steps(config: Config) -> int:
-    """Control steps of a whole run, for a progress bar."""
+    """Control steps of a whole run, for a progress bar; rounds of practice are not foreseen."""
     teaching = config.teaching
     taught = teaching.duration + teaching.rest_runs * teaching.rest_duration
-    seconds = taught + config.free_run
+    seconds = taught + config.practice.trial + (1 + config.kicks) * config.free_run
     return config.seeds * len(config.of_seed(0).tasks) * round(seconds / config.timestep)
 
 
@@ -143,39 +174,67 @@ def run(config: Config, *, on_steps: OnSteps = lambda steps: None) -> Result:
     Raises:
         BodyFileError, InvalidArgumentError: a body that cannot do the task.
     """
-    bodies = []
-    for index in range(config.seeds):
-        one = config.of_seed(index)
+    names = config.of_seed(0).tasks
+    pairs = [(config.of_seed(index), name) for index in range(config.seeds) for name in names]
+    for one, name in pairs[: len(names)]:
+        limit_cycle.check_task(one, limit_cycle.get_body(one)[0], target(name))
+
+    def work(pair: tuple[limit_cycle.Config, str], report: OnSteps) -> SwingUp:
+        one, name = pair
         body, _, _ = limit_cycle.get_body(one)
-        tasks = {name: target(name) for name in one.tasks}
-        for wanted in tasks.values():
-            limit_cycle.check_task(one, body, wanted)
-        seed = one.noise_seed
-        bodies.append({n: _swing_up(config, body, w, seed, on_steps) for n, w in tasks.items()})
-    return Result(config, bodies)
+        return _swing_up(config, body, target(name), one.noise_seed, report)
+
+    runs = iter(in_threads(work, pairs, on_steps))
+    return Result(config, [dict(zip(names, runs, strict=False)) for _ in range(config.seeds)])
 
 
 def _swing_up(config: Config, body: Body, wanted: Target, seed: int, on_steps: OnSteps) -> SwingUp:
     """Readouts in body files are not used: they were taught to run, not to swing up."""
     simulation = Simulation(body, timestep=config.timestep, engine=config.engine)
-    parts = []
     try:
-        teach(simulation, wanted, config.teaching, seed, on_steps=on_steps)
-        simulation.reset()
-        for part in simulation.stream(
-            round(config.free_run / config.timestep), record=("outputs",)
-        ):
-            parts.append(part.get("outputs"))
-            on_steps(len(part))
+        practised = practise(
+            simulation, wanted, config.teaching, config.practice, seed, on_steps=on_steps
+        )
     except DivergenceError:
-        return SwingUp(wanted, np.zeros(0), np.zeros((0, 2)), np.inf, np.inf)
-    outputs = np.concatenate(parts)
+        return SwingUp(wanted, np.zeros((0, 2)), np.inf, np.inf, (), None)
+    outputs = _free_run(config, simulation, None, on_steps)
+    speeds = stream(seed, "initial_state")
+    kicked = [
+        _free_run(
+            config, simulation,
+            config.kick_speed * speeds.standard_normal(body.positions.shape), on_steps,
+        )
+        for _ in range(config.kicks)
+    ]  # fmt: skip
+    errors = [_end_error(config, run, wanted) for run in kicked]
     return SwingUp(
         target=wanted,
-        times=np.arange(len(outputs), dtype=np.float64) * config.timestep,
         outputs=outputs,
-        orbit_error=metrics.orbit_error(outputs[-round(config.window / config.timestep) :], wanted),
-        swing_up_time=metrics.recovery_time(
+        orbit_error=_end_error(config, outputs, wanted),
+        swing_up_time=np.inf if not len(outputs) else metrics.recovery_time(
             outputs, config.timestep, wanted, tolerance=config.tolerance
         ),
-    )
+        practice_errors=practised.errors,
+        kicked_fraction=float(np.mean(np.array(errors) < config.tolerance)) if kicked else None,
+    )  # fmt: skip
+
+
+def _free_run(
+    config: Config, simulation: Simulation, velocities: Array | None, on_steps: OnSteps
+) -> Array:
+    """Outputs (T, 2) of a free run from the body's rest positions; empty if it blows up."""
+    steps = round(config.free_run / config.timestep)
+    simulation.reset()
+    if velocities is not None:
+        simulation.set_state(velocities=velocities)
+    try:
+        return simulation.rollout(steps, record=("outputs",)).get("outputs")
+    except DivergenceError:
+        return np.zeros((0, 2))
+    finally:
+        on_steps(steps)
+
+
+def _end_error(config: Config, outputs: Array, wanted: Target) -> float:
+    last = outputs[-round(config.window / config.timestep) :]
+    return metrics.orbit_error(last, wanted) if len(last) else np.inf

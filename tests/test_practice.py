@@ -1,0 +1,109 @@
+"""Practice: what is fed back and fitted, when it ends, and that it helps."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import twins
+
+from mcmj import Simulation, Teaching, random_body, teach
+from mcmj.errors import DivergenceError, InvalidArgumentError
+from mcmj.metrics import orbit_error
+from mcmj.practice import Practice, practise
+from mcmj.streams import stream
+from mcmj.targets import target
+from mcmj.teaching import Course, Lesson
+
+STEP = 2e-3
+TAUGHT = Teaching(duration=20.0, washout=5.0, rest_runs=1, rest_duration=5.0, noise=0.1)
+SHORT = Practice(rounds=2, round_runs=1, round_duration=5.0, trial=15.0, trial_window=12.0)
+
+
+@pytest.fixture(scope="module")
+def goal():
+    return target("quadratic")
+
+
+def test_a_lesson_mixes_the_bodys_own_outputs_into_what_is_fed_back(body, w_out, goal):
+    """The same regression from the twin, driven by s y + (1 - s) y* + noise, and NumPy."""
+    simulation = Simulation(body, timestep=STEP, w_out=w_out)
+    course = Course(simulation, replace(TAUGHT, ridge_per_row=1e-6), seed=3)
+    simulation.rollout(100, record=())
+    before = simulation.state
+    course.attend(Lesson(goal.sample, 3.0, 1.0, from_rest=True, own_share=0.6, weight=0.5))
+    assert np.array_equal(simulation.state.positions, before.positions)
+    assert simulation.time == before.time
+    fit = course.fit()
+    clean = goal.sample(STEP * np.arange(1500))
+    noise = 0.1 * stream(3, "rest_noise").standard_normal(clean.shape)
+    driven = twins.run(body, 1500, timestep=STEP, w_out=w_out, gate=0.6, offset=0.4 * clean + noise)
+    x, y = driven.lengths[500:], clean[500:]
+    penalty = np.sqrt(1e-6 * len(x)) * np.eye(body.n_springs)
+    w = np.linalg.lstsq(np.vstack([x, penalty]), np.vstack([y, 0 * y[: len(penalty)]]))[0]
+    assert np.abs(x @ (fit.w_out - w)).max() < 1e-6
+
+
+def test_a_lesson_that_blows_up_leaves_no_trace(body, w_out, goal):
+    simulation = Simulation(body, timestep=STEP, w_out=1e7 * w_out)
+    course = Course(simulation, TAUGHT, seed=0)
+    course.attend(Lesson(goal.sample, 5.0))
+    first, time = course.fit(), simulation.time
+    simulation.set_readout(1e7 * w_out)
+    with pytest.raises(DivergenceError):
+        course.attend(Lesson(goal.sample, 60.0, from_rest=True, own_share=1.0))
+    assert simulation.time == time
+    assert course.fit().w_out.tobytes() == first.w_out.tobytes()
+
+
+def test_without_rounds_practice_is_teaching(goal):
+    body = random_body(0, nodes=12)
+    plain, simulation = (Simulation(body, timestep=STEP, engine="twin") for _ in range(2))
+    fit = teach(plain, goal, TAUGHT, seed=1)
+    practised = practise(simulation, goal, TAUGHT, replace(SHORT, rounds=0), seed=1)
+    assert practised.fit.w_out.tobytes() == fit.w_out.tobytes()
+    assert len(practised.errors) == 1
+    assert np.array_equal(simulation.state.positions, plain.state.positions)
+    assert simulation.time == plain.time
+
+
+def test_the_best_round_is_kept_and_its_error_is_that_of_a_run_from_rest(goal):
+    simulation = Simulation(random_body(0, nodes=12), timestep=STEP, engine="twin")
+    practised = practise(simulation, goal, TAUGHT, replace(SHORT, good_enough=1e-9), seed=1)
+    assert len(practised.errors) == 3
+    simulation.reset()
+    outputs = simulation.rollout(7500, record=("outputs",)).outputs[-6000:]
+    assert orbit_error(outputs, goal) == min(practised.errors)
+    assert np.array_equal(simulation.w_out, practised.fit.w_out)
+
+
+def test_practice_ends_when_it_is_good_enough(goal):
+    simulation = Simulation(random_body(0, nodes=12), timestep=STEP, engine="twin")
+    assert len(practise(simulation, goal, TAUGHT, replace(SHORT, good_enough=9.9), 1).errors) == 1
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        ("rounds", -1),
+        ("round_runs", 0),
+        ("round_duration", 0.0),
+        ("round_weight", np.nan),
+        ("own_shares", ()),
+        ("own_shares", (0.5, 1.5)),
+        ("trial_window", 100.0),
+        ("good_enough", 0.0),
+    ],
+)
+def test_bad_settings_are_named(name, value):
+    with pytest.raises(InvalidArgumentError) as caught:
+        Practice(**{name: value})
+    assert caught.value.name == name
+
+
+@pytest.mark.slow
+def test_practice_makes_a_body_swing_up_that_teaching_alone_does_not():
+    """Seed 10: Van der Pol from rest ends elsewhere after teaching alone."""
+    simulation = Simulation(random_body(10), engine="twin")
+    taught = Teaching(duration=120.0, rest_runs=2, rest_duration=30.0, rest_weight=1e-2)
+    practised = practise(simulation, target("van_der_pol"), taught, Practice(), seed=0)
+    assert practised.errors[0] > 0.05 > 0.02 > min(practised.errors)
