@@ -14,13 +14,14 @@ from mcmj.alteration import alter
 from mcmj.body import Body
 from mcmj.bodyfile import load_model
 from mcmj.drive import Drive
-from mcmj.errors import DivergenceError, InvalidArgumentError
+from mcmj.errors import DivergenceError
 from mcmj.leapfrog import LEAPFROG, node_velocities
 from mcmj.mjcf import to_mjcf
+from mcmj.options import Options
 from mcmj.quiet import quiet_warnings
-from mcmj.spring_laws import SpringLaw, spring_law
+from mcmj.spring_laws import spring_law
 from mcmj.trajectory import State
-from mcmj.validation import Array, as_array, require_count, require_number
+from mcmj.validation import Array, as_array, require_count
 
 _CTRL = mujoco.mjtState.mjSTATE_CTRL.value
 _APPLIED = mujoco.mjtState.mjSTATE_QFRC_APPLIED.value
@@ -30,46 +31,25 @@ _POSITION_STAGE = mujoco.mjtStage.mjSTAGE_POS.value
 
 
 class Engine:
-    """MuJoCo's side of a simulation; see Simulation for the arguments."""
+    """MuJoCo's side of a simulation; see Simulation for the options."""
 
-    def __init__(
-        self,
-        body: Body,
-        *,
-        copies: int,
-        threads: int,
-        timestep: float,
-        integrator: str,
-        springs: str | SpringLaw,
-        feedback_delay: int,
-        substeps: int,
-    ) -> None:
-        require_number("timestep", timestep, 0.0, open_low=True)
-        for name, value, low in (
-            ("copies", copies, 1),
-            ("threads", threads, 1),
-            ("feedback_delay", feedback_delay, 0),
-            ("substeps", substeps, 1),
-        ):
-            require_count(name, value, low)
-        if feedback_delay and integrator == "RK4":
-            raise InvalidArgumentError(
-                "feedback_delay", "0 under RK4, whose inner stages MuJoCo's delayed sensors keep",
-                feedback_delay,
-            )  # fmt: skip
-        self.body, self.timestep, self.integrator = body, timestep, integrator
-        self.substeps = substeps
-        self._physics_step = timestep / substeps
+    def __init__(self, body: Body, options: Options, *, copies: int, threads: int) -> None:
+        require_count("copies", copies, 1)
+        require_count("threads", threads, 1)
+        self.body, self.options = body, options
+        timestep, integrator, substeps = options.timestep, options.integrator, options.substeps
+        self.timestep, self.integrator, self.substeps = timestep, integrator, substeps
+        self._physics_step = options.physics_step
         xml = to_mjcf(
             body,
             timestep=self._physics_step,
             integrator=integrator,
             w_out=np.zeros((body.n_springs + 1, body.n_outputs)),
-            springs=springs,
-            feedback_delay=feedback_delay * timestep,
+            springs=options.springs,
+            feedback_delay=options.feedback_delay * timestep,
             control_period=timestep if substeps > 1 else 0.0,
         )
-        self._law = law = spring_law(springs)  # keeps the compiled function alive
+        self._law = law = spring_law(options.springs)  # keeps the compiled function alive
         self._callbacks = {"springs": law is not None, "leapfrog": integrator == LEAPFROG}
         laws.install(**self._callbacks)  # first: MuJoCo's compiler calls them too
         self.model = load_model(xml)

@@ -4,7 +4,7 @@ import numpy as np
 
 from mcmj.body import Body
 from mcmj.engines import make_engine
-from mcmj.mjcf import DEFAULT_INTEGRATOR
+from mcmj.options import DEFAULT_INTEGRATOR, Options
 from mcmj.simulation import Simulation
 from mcmj.spring_laws import SpringLaw
 from mcmj.steplimit import warn_if_unstable
@@ -39,18 +39,9 @@ class Ensemble(Simulation):
         substeps: int = 1,
         engine: str = "mujoco",
     ) -> None:
-        self._engine = make_engine(
-            engine,
-            body,
-            copies=copies,
-            threads=threads,
-            timestep=timestep,
-            integrator=integrator,
-            springs=springs,
-            feedback_delay=feedback_delay,
-            substeps=substeps,
-        )
-        warn_if_unstable(body, timestep, substeps, integrator, springs)
+        options = Options(timestep, integrator, springs, feedback_delay, substeps, engine)
+        self._engine = make_engine(body, options, copies=copies, threads=threads)
+        warn_if_unstable(body, options)
         self._copies = copies
         self.set_readout(w_out)
 

@@ -19,11 +19,11 @@ from mcmj.body import Body
 from mcmj.errors import InvalidArgumentError, UnknownNameError
 from mcmj.leapfrog import LEAPFROG, userdata_size
 from mcmj.memory import TAG
+from mcmj.options import DEFAULT_INTEGRATOR
 from mcmj.spring_laws import SpringLaw, spring_law
 from mcmj.validation import Array, as_array, require_number
 
 INTEGRATORS = ("Euler", "RK4", "implicit", "implicitfast", "discrete", LEAPFROG)
-DEFAULT_INTEGRATOR = "Euler"
 READOUT_PREFIX = "readout/"
 
 

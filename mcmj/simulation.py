@@ -19,7 +19,8 @@ from mcmj.drive import Drive, check_drive
 from mcmj.engine import Engine
 from mcmj.engines import make_engine
 from mcmj.errors import DivergenceError, InvalidArgumentError, UnknownNameError
-from mcmj.mjcf import DEFAULT_INTEGRATOR, checked_readout
+from mcmj.mjcf import checked_readout
+from mcmj.options import DEFAULT_INTEGRATOR, Options
 from mcmj.spring_laws import SpringLaw
 from mcmj.steplimit import warn_if_unstable
 from mcmj.trajectory import RECORDABLE, State, Trajectory, join
@@ -65,18 +66,9 @@ class Simulation:
         substeps: int = 1,
         engine: str = "mujoco",
     ) -> None:
-        self._engine = make_engine(
-            engine,
-            body,
-            copies=1,
-            threads=1,
-            timestep=timestep,
-            integrator=integrator,
-            springs=springs,
-            feedback_delay=feedback_delay,
-            substeps=substeps,
-        )
-        warn_if_unstable(body, timestep, substeps, integrator, springs)
+        options = Options(timestep, integrator, springs, feedback_delay, substeps, engine)
+        self._engine = make_engine(body, options, copies=1, threads=1)
+        warn_if_unstable(body, options)
         self.set_readout(w_out)
 
     @property

@@ -17,6 +17,7 @@ from mcmj.eigenlimits import RK4_REACH, limit_of, stable_at
 from mcmj.errors import StabilityWarning, UnknownNameError
 from mcmj.linearisation import Linearised, linear_system, linearise, slopes
 from mcmj.onestep import ALIASES, SCHEMES
+from mcmj.options import Options
 from mcmj.spring_laws import SpringLaw
 from mcmj.validation import Array, require_number
 
@@ -122,17 +123,15 @@ def _advice(system: Linearised, timestep: float, integrator: str) -> Advice:
     return Advice(integrator, limit, max(1, enough), tuple(others))
 
 
-def warn_if_unstable(
-    body: Body, timestep: float, substeps: int, integrator: str, springs: str | SpringLaw
-) -> None:
+def warn_if_unstable(body: Body, options: Options) -> None:
     """Warn of a step that makes the body blow up however small its motions; else cost little."""
-    step = timestep / substeps
+    step, integrator, springs = options.physics_step, options.integrator, options.springs
     if integrator not in SCHEMES or _surely_stable(body, step, integrator, springs):
         return
     system = linear_system(body, springs=springs)
     if stable_at(system, integrator, step):
         return
-    advice = _advice(system, timestep, integrator)
+    advice = _advice(system, options.timestep, integrator)
     warnings.warn(
         f"step {1e3 * step:.4g} ms is above {1e3 * advice.limit:.4g} ms, the stability limit of "
         f"integrator {integrator} for this body at rest: it may blow up; use {advice}",

@@ -21,6 +21,7 @@ LEVELS = (
     ("errors",),
     ("validation",),
     ("streams", "spring_laws", "structs"),
+    ("options",),
     ("body",),
     ("generator", "appearance"),
     ("laws",),

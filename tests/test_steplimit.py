@@ -10,6 +10,7 @@ from mcmj.errors import InvalidArgumentError, McmjWarning, StabilityWarning, Unk
 from mcmj.experiments.hard_cases import bisect
 from mcmj.mjcf import INTEGRATORS
 from mcmj.onestep import SCHEMES
+from mcmj.options import Options
 from mcmj.steplimit import recommend, stability_limit, warn_if_unstable
 
 TINY = 1e-12  # damping of what should be undamped
@@ -195,7 +196,7 @@ def test_the_check_is_cheap():
         function()
         return time.perf_counter() - start
 
-    check = min(seconds(lambda: warn_if_unstable(body, 1e-3, 1, "Euler", "native"))
+    check = min(seconds(lambda: warn_if_unstable(body, Options()))
                 for _ in range(5))  # fmt: skip
     whole = min(seconds(lambda: mcmj.Simulation(body)) for _ in range(3))
     assert check < 0.05 * whole

@@ -18,7 +18,7 @@ from mcmj.bodyfile import (
 from mcmj.errors import InvalidArgumentError, McmjWarning, UnknownNameError
 from mcmj.generator import BodySettings, draw_body
 from mcmj.library import body_path
-from mcmj.mjcf import DEFAULT_INTEGRATOR
+from mcmj.options import DEFAULT_INTEGRATOR
 from mcmj.spring_laws import NATIVE
 from mcmj.targets import TARGETS, Target
 from mcmj.teaching import Teaching

@@ -5,6 +5,7 @@ import numpy as np
 from mcmj.body import Body, spring_lengths
 from mcmj.drive import Drive
 from mcmj.errors import InvalidArgumentError, UnknownNameError
+from mcmj.options import Options
 from mcmj.trajectory import State
 from mcmj.twin.population import Population, rest
 from mcmj.validation import Array, as_array, require_count
@@ -14,15 +15,14 @@ TWIN_OF = {"Euler": "semi_implicit_euler", "RK4": "rk4", "leapfrog": "leapfrog"}
 
 
 class TwinEngine:
-    """Copies of one body under a compiled twin; see Simulation for the arguments.
+    """Copies of one body under a compiled twin; see Simulation for the options.
 
     Records lengths only: positions and velocities are MuJoCo's to show.
     """
 
-    def __init__(
-        self, body: Body, *, copies: int, threads: int, timestep: float, integrator: str
-    ) -> None:
+    def __init__(self, body: Body, options: Options, *, copies: int, threads: int) -> None:
         require_count("copies", copies, 1)
+        timestep, integrator = options.timestep, options.integrator
         if integrator not in TWIN_OF:
             raise UnknownNameError("integrator of the twin", integrator, TWIN_OF)
         self.body, self.timestep, self.integrator = body, timestep, integrator
