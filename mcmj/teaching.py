@@ -60,6 +60,11 @@ class Teaching:
         for name in ("rest_duration", "rest_weight"):
             require_number(name, getattr(self, name), 0.0, open_low=True)
 
+    @property
+    def total(self) -> float:
+        """Of all runs together [s]."""
+        return self.duration + self.rest_runs * self.rest_duration
+
 
 @dataclass(frozen=True)
 class Lesson:

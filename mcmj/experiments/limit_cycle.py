@@ -147,7 +147,7 @@ def _run_task(
         done, fit = None, _ready(simulation, config, wanted, w_out, on_steps)
     else:
         done, fit = resumed
-        on_steps(round(config.teaching.duration / config.timestep) + len(done))
+        on_steps(round(config.teaching.total / config.timestep) + len(done))
     total, last = (round(s / config.timestep) for s in (config.free_run, config.window))
     first = free_run(
         simulation, total - last, done=done, checkpoint=checkpoint, fit=fit, on_steps=on_steps

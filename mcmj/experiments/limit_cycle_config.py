@@ -106,7 +106,7 @@ def _warn_if_other_physics(config: Config, model: mujoco.MjModel) -> None:
 
 def total_steps(config: Config) -> int:
     """Control steps of a whole run, for a progress bar."""
-    seconds = config.teaching.duration + config.free_run
+    seconds = config.teaching.total + config.free_run
     return len(config.tasks) * round(seconds / config.timestep)
 
 

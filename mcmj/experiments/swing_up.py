@@ -162,9 +162,7 @@ class Result:
 
 def total_steps(config: Config) -> int:
     """Control steps of a whole run, for a progress bar; rounds of practice are not foreseen."""
-    teaching = config.teaching
-    taught = teaching.duration + teaching.rest_runs * teaching.rest_duration
-    seconds = taught + config.practice.trial + (1 + config.kicks) * config.free_run
+    seconds = config.teaching.total + config.practice.trial + (1 + config.kicks) * config.free_run
     return config.seeds * len(config.of_seed(0).tasks) * round(seconds / config.timestep)
 
 
