@@ -132,7 +132,7 @@ def swing_up_figure(runs: Mapping[str, tuple[Target, float, Array, float, float]
         time_axes.margins(x=0)
         plane.set_title(f"orbit error in the end {100 * error:.2f} %")
         plane.set(aspect="equal", ylabel="$x_2$")
-        plane.locator_params(axis="x", nbins=4)
+        plane.locator_params(axis="x", nbins=2)
     axes[0, 0].legend(loc="upper left", frameon=False)
     axes[-1, 0].set_xlabel("time in closed loop [s]")
     axes[-1, 1].set_xlabel("$x_1$")
