@@ -79,7 +79,7 @@ def period(outputs: Array, timestep: float, guess: float) -> float:
     require_number("timestep", timestep, 0.0, open_low=True)
     require_number("guess", guess, 0.0, open_low=True)
     values = as_array("outputs", outputs, (None, None))
-    if (np.ptp(values, axis=0) <= 1e-9 * (1.0 + np.abs(values).max())).all():
+    if _at_rest(values):
         raise InvalidArgumentError("outputs", "something that moves", "outputs at rest")
     if len(values) * timestep < PERIODS_NEEDED * guess:
         raise InvalidArgumentError(
@@ -99,12 +99,15 @@ def period(outputs: Array, timestep: float, guess: float) -> float:
     return float(estimate * timestep)
 
 
+def period_or_nan(outputs: Array, timestep: float, target: Target) -> float:
+    """Mean period [s] of outputs near a target's; NaN if they rest or do not repeat."""
+    values = as_array("outputs", outputs, (None, target.n_outputs))
+    return np.nan if _at_rest(values) else period(values, timestep, target.period)
+
+
 def relative_period_error(outputs: Array, timestep: float, target: Target) -> float:
     """|T - T*| / T*, T the outputs' mean period and T* the target's; infinite without a period."""
-    values = as_array("outputs", outputs, (None, target.n_outputs))
-    if (np.ptp(values, axis=0) <= 1e-9 * (1.0 + np.abs(values).max())).all():
-        return np.inf
-    found = period(values, timestep, target.period)
+    found = period_or_nan(outputs, timestep, target)
     return np.inf if np.isnan(found) else abs(found / target.period - 1.0)
 
 
@@ -113,6 +116,10 @@ def relative_amplitude_error(outputs: Array, target: Target) -> float:
     values = as_array("outputs", outputs, (None, target.n_outputs))
     wanted = np.ptp(target.orbit(ORBIT_POINTS), axis=0)
     return float(np.abs(np.ptp(values, axis=0) / wanted - 1.0).max())
+
+
+def _at_rest(values: Array) -> bool:
+    return bool((np.ptp(values, axis=0) <= 1e-9 * (1.0 + np.abs(values).max())).all())
 
 
 def _rms(distances: Array) -> float:

@@ -111,7 +111,7 @@ def limit_cycle_figure(
         wanted = target.sample(times[:shown])
         draw_outputs(first, times[:shown] - start, outputs[:shown], wanted)
         end = outputs[-shown:]
-        shift = _best_phase(end, target, times[-shown:])
+        shift = best_phase(end, target, times[-shown:])
         draw_outputs(last, times[-shown:] - start, end, target.sample(times[-shown:] + shift))
         draw_phase_plane(plane, end, target)
         first.set_title(f"{TITLES.get(target.name, target.name)}: loop closed at 0 s")
@@ -172,7 +172,7 @@ def growth_figure(rows: Sequence[dict[str, float]]) -> Figure:
     return figure
 
 
-def _best_phase(outputs: Array, target: Target, times: Array) -> float:
+def best_phase(outputs: Array, target: Target, times: Array) -> float:
     """Time shift of the target that fits the outputs best: phases drift apart, shapes do not."""
     sparse = slice(None, None, max(1, len(times) // 2000))
     shifts = np.linspace(-0.5, 0.5, 401) * target.period

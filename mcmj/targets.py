@@ -23,7 +23,8 @@ class Target:
         name: for figures and files.
         period: [s].
         curve: function of times (T,) in [0, period] -> (T, n_outputs).
-        rhs: of the autonomous system x' = rhs(t, x) whose limit cycle it is, if it is one.
+        rhs: of the autonomous system x' = rhs(t, x) whose limit cycle it is, if it is one and
+            the signal is its whole state.
     """
 
     name: str
@@ -61,6 +62,7 @@ def limit_cycle(
     *,
     transient: float = 100.0,
     longest_period: float = 100.0,
+    observe: Callable[[Array], Array] | None = None,
 ) -> Target:
     """The limit cycle that x' = rhs(t, x) reaches from a start, by DOP853.
 
@@ -69,9 +71,10 @@ def limit_cycle(
 
     Args:
         rhs: autonomous right-hand side.
-        start: x(0), (n_outputs,).
+        start: x(0), (n,).
         transient: time to reach the cycle [s].
         longest_period: give up looking for a return after this time [s].
+        observe: function of states (T, n) -> the signal (T, n_outputs); default: the states.
 
     Raises:
         McmjError: no cycle is reached: the system rests, diverges or does not come back.
@@ -94,7 +97,9 @@ def limit_cycle(
     ]
     if not returns:
         raise McmjError(f"{name}: no return to x = {origin} within {longest_period:g} s")
-    return Target(name, returns[0], lambda times: solution.sol(times).T, rhs)
+    if observe is None:
+        return Target(name, returns[0], lambda times: solution.sol(times).T, rhs)
+    return Target(name, returns[0], lambda times: observe(solution.sol(times).T))
 
 
 def from_array(name: str, values: npt.ArrayLike, timestep: float) -> Target:
