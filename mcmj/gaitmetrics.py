@@ -79,30 +79,33 @@ def duty_factor_error(duties: Array, target: Target) -> float:
 def switching_time(
     outputs: Array, timestep: float, target: Target, *, tolerance: float = 0.05
 ) -> float:
-    """Time [s] from which on outputs (T, n) and their rates stay within the tolerance of the gait.
+    """Time [s] from which on outputs (T, n) stay within the tolerance of the gait.
 
-    `metrics.recovery_time` in the space of (x, x' T* / 2 pi), T* the target's period: in the
-    space of the outputs alone, legs in phase or antiphase draw a thin loop or a line, on which a
+    `metrics.recovery_time` in the space of (x(t), x(t + T* / 4)), T* the target's period: in
+    the space of x(t) alone, legs in phase or antiphase draw a thin loop or a line, on which a
     body at rest lies as well as one that trots too fast.
+
+    Raises:
+        InvalidArgumentError: wrong shape, NaN, or less than a quarter of a period.
     """
-    rated = with_rates(target)
-    scale = target.period / (2 * np.pi)
     values = as_array("outputs", outputs, (None, target.n_outputs))
-    rates = np.gradient(values, timestep, axis=0) * scale
-    return metrics.recovery_time(np.hstack([values, rates]), timestep, rated, tolerance=tolerance)
+    later = round(target.period / 4 / timestep)
+    if later >= len(values):
+        got = f"{len(values) * timestep:g} s"
+        raise InvalidArgumentError("outputs", f"more than {target.period / 4:g} s", got)
+    pairs = np.hstack([values[:-later], values[later:]])
+    return metrics.recovery_time(pairs, timestep, delay_embedding(target), tolerance=tolerance)
 
 
 @functools.lru_cache(maxsize=16)
-def with_rates(target: Target) -> Target:
-    """The target (x, x' T / 2 pi), with twice the outputs: a circle for a sine."""
-    scale = target.period / (2 * np.pi)
-    half = 1e-5 * target.period
+def delay_embedding(target: Target) -> Target:
+    """The target (x(t), x(t + T / 4)), with twice the outputs: a circle for a sine."""
+    quarter = target.period / 4
 
     def curve(times: Array) -> Array:
-        rates = (target.sample(times + half) - target.sample(times - half)) / (2 * half)
-        return np.hstack([target.sample(times), rates * scale])
+        return np.hstack([target.sample(times), target.sample(times + quarter)])
 
-    return Target(f"{target.name}_with_rates", target.period, curve)
+    return Target(f"{target.name} and a quarter later", target.period, curve)
 
 
 def target_phase_lags(target: Target) -> Array:

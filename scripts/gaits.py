@@ -12,8 +12,9 @@ from rich.table import Table
 
 from mcmj import store
 from mcmj.cli import Output, main
-from mcmj.experiments.gaits import Result, run
+from mcmj.experiments.gaits import run
 from mcmj.experiments.gaits_config import Config, total_steps
+from mcmj.experiments.gaits_result import Result
 from mcmj.gaitplot import gait_diagram, switch_figure
 from mcmj.mjcf import to_mjcf
 from mcmj.plotting import save

@@ -156,6 +156,22 @@ def test_speed_accuracy(tmp_path):
     assert (tmp_path / "speed_accuracy.csv").read_text().count("\n") == 10
 
 
+def test_gaits(tmp_path):
+    options = ["--gaits", "trot", "pace", "--seed", "3", "--nodes", "12", "--engine", "twin"]
+    options += ["--duration", "10", "--washout", "4", "--free-run", "8", "--before", "5"]
+    options += ["--after", "10", "--from-rest", "8", "--window", "8", "--out", tmp_path]
+    status, out, err = run("gaits", *options)
+    assert status == 0, err
+    assert "from \\ to" in out
+    metrics = metrics_of(tmp_path)["metrics"]
+    assert set(metrics) == {"trot", "pace", "switch"}
+    assert {"orbit_error", "switching_time"} <= set(metrics["switch"]["trot_to_pace"])
+    assert {"orbit_error", "phase_lag_error"} <= set(metrics["pace"])
+    assert set(readouts_of_model(load_model(tmp_path / "body.xml"))) == {"trot", "pace"}
+    for figure in ("gaits.png", "gait_diagram.png"):
+        assert (tmp_path / figure).stat().st_size > 10_000
+
+
 @pytest.mark.slow
 def test_benchmark(tmp_path):
     options = ["--steps", "50", "--repeats", "1", "--sizes", "10", "20", "--memory-steps", "1000"]

@@ -1,135 +1,22 @@
 """Figs. 8 and 9: one body, four gaits; a switch of the readout is a switch of the gait."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 
 import numpy as np
 
-from mcmj import gaitmetrics, metrics
 from mcmj.body import Body
 from mcmj.errors import DivergenceError, UnknownNameError
 from mcmj.experiments.gaits_config import Config, check, get_body
+from mcmj.experiments.gaits_result import BodyResult, Result, Run, Taught, measure, outcome
 from mcmj.gaits import LEGS, gait_target
 from mcmj.mjcf import checked_readout
 from mcmj.progress import OnSteps
-from mcmj.rates import success_rate
-from mcmj.readout import Fit
 from mcmj.schedule import Phase, Schedule, run_schedule
 from mcmj.simulation import Simulation
-from mcmj.targets import Target
 from mcmj.teaching import synchronise, teach
 from mcmj.validation import Array
 
 LOST = np.zeros((0, len(LEGS)))  # outputs of a run that blew up
-
-
-@dataclass(frozen=True)
-class Run:
-    """Outputs in one gait, and how far they are from it at the end.
-
-    Attributes:
-        outputs: (T, 4); empty if the body blew up, then the errors are infinite.
-        errors: by name: orbit, period, phase lag and duty factor error of the last window.
-        time: from the start of the run, or from the switch on, until outputs and rates stay
-            within the tolerance of the gait (mcmj.gaitmetrics) [s]; infinite if they do not.
-        switched: row at which the readout is switched.
-        duty_factors, phase_lags: (4,) of the last window; NaN if it does not repeat.
-    """
-
-    outputs: Array
-    errors: dict[str, float]
-    time: float
-    duty_factors: Array
-    phase_lags: Array
-    switched: int = 0
-
-
-@dataclass(frozen=True)
-class Taught:
-    """One gait of one body: its readout (None if teaching blew up), the fit if it was taught."""
-
-    target: Target
-    w_out: Array | None
-    fit: Fit | None
-    free: Run
-    from_rest: Run
-
-
-@dataclass(frozen=True)
-class BodyResult:
-    """One body: its gaits, and the switches between them by (from, to)."""
-
-    body: Body
-    source: dict[str, object]
-    gaits: dict[str, Taught]
-    switches: dict[tuple[str, str], Run]
-
-    @property
-    def metrics(self) -> dict[str, object]:
-        """Errors by gait, and by switch."""
-        table: dict[str, object] = {}
-        for name, gait in self.gaits.items():
-            fit, rest = gait.fit, gait.from_rest
-            table[name] = {
-                **gait.free.errors,
-                "period": gait.target.period,
-                "duty_factor": gait.free.duty_factors,
-                "phase_lags": gait.free.phase_lags,
-                "from_rest": {**rest.errors, "swing_up_time": rest.time},
-                "train_nrmse": fit.train_nrmse if fit else None,
-                "condition_number": fit.condition_number if fit else None,
-            }
-        table["switch"] = {
-            f"{first}_to_{second}": {**run.errors, "switching_time": run.time}
-            for (first, second), run in self.switches.items()
-        }
-        return table
-
-    def successes(self, tolerance: float) -> dict[str, bool]:
-        """Whether all free runs, all switches and all runs from rest end in the gait."""
-        runs = {
-            "free_run": [gait.free for gait in self.gaits.values()],
-            "switch": list(self.switches.values()),
-            "from_rest": [gait.from_rest for gait in self.gaits.values()],
-        }
-        good = {kind: all(arrived(run, tolerance) for run in some) for kind, some in runs.items()}
-        return {**good, "all": all(good.values())}
-
-
-def arrived(run: Run, tolerance: float) -> bool:
-    """Whether a run ends in its gait: orbit and period error below the tolerance.
-
-    The period counts because legs in phase or antiphase draw the same line in the space of
-    the outputs at any pace.
-    """
-    return max(run.errors["orbit_error"], run.errors["period_error"]) < tolerance
-
-
-@dataclass(frozen=True)
-class Result:
-    """The first body with its outputs, and the outcomes of all, one a seed."""
-
-    config: Config
-    first: BodyResult
-    outcomes: list[dict[str, object]]
-
-    @property
-    def metrics(self) -> dict[str, object]:
-        """As written to metrics.json: the first body's numbers, and counts over all seeds."""
-        table = self.first.metrics
-        if self.config.seeds > 1:
-            table["seeds"] = self.rates
-        return table
-
-    @property
-    def rates(self) -> dict[str, object]:
-        """How many bodies run all gaits, make all switches, start from rest, do all of it."""
-        kinds = ("free_run", "switch", "from_rest", "all")
-        table: dict[str, object] = {
-            kind: success_rate([bool(one[kind]) for one in self.outcomes]) for kind in kinds
-        }
-        table["outcomes"] = self.outcomes
-        return table
 
 
 def run(config: Config, *, on_steps: OnSteps = lambda steps: None) -> Result:
@@ -146,26 +33,6 @@ def run(config: Config, *, on_steps: OnSteps = lambda steps: None) -> Result:
         first = first or result  # the outputs of the others are not kept
     assert first is not None
     return Result(config, first, outcomes)
-
-
-def outcome(result: BodyResult, seed: int, tolerance: float) -> dict[str, object]:
-    """What is kept of a body: what it managed, its worst errors, and the switches it missed."""
-    free = [gait.free.errors for gait in result.gaits.values()]
-    switches = result.switches
-    return {
-        "seed": seed,
-        **result.successes(tolerance),
-        "worst_orbit_error": max(errors["orbit_error"] for errors in free),
-        "worst_period_error": max(errors["period_error"] for errors in free),
-        "worst_phase_lag_error": max(errors["phase_lag_error"] for errors in free),
-        "worst_switch_error": max(
-            (run.errors["orbit_error"] for run in switches.values()), default=0
-        ),
-        "worst_switching_time": max((run.time for run in switches.values()), default=0),
-        "switches_missed": [
-            f"{a}_to_{b}" for (a, b), run in switches.items() if not arrived(run, tolerance)
-        ],
-    }
 
 
 def run_body(
@@ -220,13 +87,13 @@ def _run_gait(
             synchronise(simulation, wanted, config.teaching.washout)
             simulation.set_readout(w_out)
     except DivergenceError:
-        lost = _measured(config, LOST, wanted)
+        lost = measure(config, LOST, wanted)
         return Taught(wanted, w_out, fit, lost, lost)
     taught = simulation.snapshot()
     simulation.reset()
-    from_rest = _measured(config, _rollout(config, simulation, config.from_rest, on_steps), wanted)
+    from_rest = measure(config, _rollout(config, simulation, config.from_rest, on_steps), wanted)
     simulation.restore(taught)
-    free = _measured(config, _rollout(config, simulation, config.free_run, on_steps), wanted)
+    free = measure(config, _rollout(config, simulation, config.free_run, on_steps), wanted)
     return Taught(wanted, w_out, fit, free, from_rest)
 
 
@@ -247,35 +114,9 @@ def _switch(
     """Go on in one gait, then replace its readout by another's, at once."""
     phases = [Phase(config.before, w_out=first.w_out), Phase(config.after, w_out=second.w_out)]
     if not all(len(gait.free.outputs) for gait in (first, second)):
-        return _measured(config, LOST, second.target)
+        return measure(config, LOST, second.target)
     try:
         run = run_schedule(simulation, Schedule(phases), 0, on_steps=on_steps)
     except DivergenceError:
-        return _measured(config, LOST, second.target)
-    return _measured(config, run.feedback, second.target, switched=run.boundaries[1])
-
-
-def _measured(config: Config, outputs: Array, wanted: Target, *, switched: int = 0) -> Run:
-    """Outputs with their errors at the end, and the time that they took to the gait."""
-    step = config.timestep
-    duties = lags = np.full(len(LEGS), np.nan)
-    orbit_error, period, time = np.inf, np.nan, np.inf
-    if len(outputs):
-        last = outputs[-round(config.window / step) :]
-        orbit_error, period = (
-            metrics.orbit_error(last, wanted),
-            metrics.period_or_nan(last, step, wanted),
-        )
-        time = gaitmetrics.switching_time(
-            outputs[switched:], step, wanted, tolerance=config.tolerance
-        )
-        if not np.isnan(period):
-            duties = gaitmetrics.duty_factors(last, step, period)
-            lags = gaitmetrics.phase_lags(last, step, period)
-    errors = {
-        "orbit_error": orbit_error,
-        "period_error": np.inf if np.isnan(period) else abs(period / wanted.period - 1.0),
-        "phase_lag_error": gaitmetrics.phase_lag_error(lags, wanted),
-        "duty_factor_error": gaitmetrics.duty_factor_error(duties, wanted),
-    }
-    return Run(outputs, errors, time, duties, lags, switched)
+        return measure(config, LOST, second.target)
+    return measure(config, run.feedback, second.target, switched=run.boundaries[1])
