@@ -76,7 +76,7 @@ def gait_diagram(
         shown: time of each gait [s].
     """
     wide = -(-len(gaits) // 2)
-    figure = new_figure(12.0, 1.75 * (wide + len(switches)) + 0.6)
+    figure = new_figure(12.0, 1.75 * (wide + len(switches)) + 0.8)
     grid = figure.add_gridspec(wide + len(switches), 2)
     for place, (title, (target, outputs)) in enumerate(gaits.items()):
         axes = figure.add_subplot(grid[place // 2, place % 2])
@@ -86,6 +86,7 @@ def gait_diagram(
         _bars(axes, times, wanted, TARGET_COLOUR, below=True)
         _bars(axes, times, last, "black")
         _legs(axes, title, (0.0, shown))
+        axes.set_xlabel("time [s]" if place >= len(gaits) - 2 else "")
     for place, (title, switch) in enumerate(switches.items()):
         axes = figure.add_subplot(grid[wide + place, :])
         _, after, outputs, row, arrival = switch
@@ -95,7 +96,8 @@ def gait_diagram(
         _bars(axes, times, outputs, "black")
         _legs(axes, f"{title}: {_when(arrival)}", _shown(after, times, arrival))
         _mark(axes, arrival)
-    figure.axes[-1].set_xlabel("time [s]; below: after the switch of the readout")
+    if switches:
+        figure.axes[-1].set_xlabel("time after the switch of the readout [s]")
     handles = [
         Patch(color="black", label="stance (output falls)"),
         Patch(color=TARGET_COLOUR, alpha=0.55, label="target's stance"),
