@@ -1,6 +1,6 @@
-"""Practice: a body learns to find its rhythm by itself, from total rest.
+"""Practice: a body learns to find its rhythm by itself, from total rest or from another rhythm.
 
-Under a teacher the body sees only states near the target; from rest the closed loop passes
+Under a teacher the body sees only states near the target; from elsewhere the closed loop passes
 through others, and what the readout says there decides where it ends. So the teacher lets go
 by degrees: a share s of what is fed back is the body's own output, s y + (1 - s) y* + noise,
 and the readout is fitted again to all that was seen, the target staying y*. That is dataset
@@ -8,6 +8,7 @@ aggregation (DAgger: Ross, Gordon and Bagnell, AISTATS 2011), which, too, keeps 
 its rounds.
 """
 
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 
@@ -17,23 +18,25 @@ from mcmj.progress import OnSteps
 from mcmj.readout import Fit
 from mcmj.simulation import Simulation
 from mcmj.targets import Target
-from mcmj.teaching import Course, Lesson, Teaching, lessons_of
-from mcmj.validation import require_count, require_number
+from mcmj.teaching import Course, Lesson
+from mcmj.validation import Array, require_count, require_number
+
+Judge = Callable[[Array], float]
 
 
 @dataclass(frozen=True)
 class Practice:
-    """How long a body practises; every run starts from total rest.
+    """How long a body practises, and what from.
 
     Attributes:
         rounds: at most so many, after the first fit.
-        round_runs: runs in each round.
+        round_runs: runs in each round, from each start that does not lead home yet.
         round_duration: of each run [s].
         round_weight: of their squared errors, against 1 for those on the cycle.
         own_shares: s of the first, second, .. round, over and over.
-        trial: after every fit, a free run from rest this long [s] ..
-        trial_window: .. is judged by the orbit error of its last part [s].
-        good_enough: orbit error at which practice ends.
+        trial: after every fit, a free run from every start this long [s] ..
+        trial_window: .. is judged by the error of its last part [s].
+        good_enough: error of the worst trial at which practice ends.
     """
 
     rounds: int = 18
@@ -63,8 +66,8 @@ class Practised:
 
     Attributes:
         fit: of the best round; the simulation has its readout.
-        errors: orbit error of the trial after the first fit and after every round; infinite
-            where it blew up.
+        errors: of the worst trial after the first fit and after every round; infinite where
+            it blew up.
     """
 
     fit: Fit
@@ -72,58 +75,76 @@ class Practised:
 
 
 def practise(
-    simulation: Simulation,
+    course: Course,
     target: Target,
-    teaching: Teaching,
     practice: Practice,
-    seed: int,
     *,
+    starts: Sequence[Array] = (),
+    judge: Judge | None = None,
     on_steps: OnSteps = lambda steps: None,
 ) -> Practised:
-    """Teach a target, then practise it from rest until a trial is good enough.
+    """Practise a target that a course has taught, until every trial is good enough.
 
-    As with `teach`, the simulation is left on the cycle, at the end of teacher forcing.
+    A round practises from the starts whose trial was not. The simulation is left where it was.
 
     Args:
-        seed: of the noise streams.
+        course: has attended its lessons; goes on with those of practice.
+        starts: snapshots of the simulation to start from as well, such as another rhythm.
+        judge: error of the last part of a trial; default: the orbit error.
         on_steps: called with the number of steps done after every chunk, for progress bars.
-
-    Raises:
-        DivergenceError: the body blew up under the teacher (in practice it may).
     """
-    course = Course(simulation, teaching, seed)
-    for lesson in lessons_of(target, teaching):
-        course.attend(lesson, on_steps=on_steps)
-    fits, errors = [course.fit()], [_trial(simulation, target, practice, on_steps)]
-    while min(errors) > practice.good_enough and len(fits) <= practice.rounds:
-        share = practice.own_shares[(len(fits) - 1) % len(practice.own_shares)]
-        lesson = Lesson(
-            target.sample, practice.round_duration, weight=practice.round_weight, from_rest=True,
-            own_share=share,
-        )  # fmt: skip
-        for _ in range(practice.round_runs):
-            _try_lesson(course, lesson, on_steps)
+    judge = judge or (lambda outputs: metrics.orbit_error(outputs, target))
+    places: list[Array | None] = [None, *starts]  # None: total rest
+    fits, trials = [], []
+    while True:
         fits.append(course.fit())
-        errors.append(_trial(simulation, target, practice, on_steps))
+        trials.append([_trial(course.simulation, practice, p, judge, on_steps) for p in places])
+        if max(trials[-1]) <= practice.good_enough or len(fits) > practice.rounds:
+            break
+        share = practice.own_shares[(len(fits) - 1) % len(practice.own_shares)]
+        for place, error in zip(places, trials[-1], strict=True):
+            if error > practice.good_enough:
+                _try_lessons(course, target, practice, place, share, on_steps)
+    errors = tuple(max(each) for each in trials)
     best = fits[errors.index(min(errors))]
-    simulation.set_readout(best.w_out)
-    return Practised(best, tuple(errors))
+    course.simulation.set_readout(best.w_out)
+    return Practised(best, errors)
 
 
-def _try_lesson(course: Course, lesson: Lesson, on_steps: OnSteps) -> None:
-    with suppress(DivergenceError):  # there is nothing to learn from where it went
-        course.attend(lesson, on_steps=on_steps)
+def _try_lessons(
+    course: Course,
+    target: Target,
+    practice: Practice,
+    start: Array | None,
+    share: float,
+    on_steps: OnSteps,
+) -> None:
+    lesson = Lesson(
+        target.sample, practice.round_duration, weight=practice.round_weight,
+        from_rest=start is None, start=start, own_share=share,
+    )  # fmt: skip
+    for _ in range(practice.round_runs):
+        with suppress(DivergenceError):  # there is nothing to learn from where it went
+            course.attend(lesson, on_steps=on_steps)
 
 
-def _trial(simulation: Simulation, target: Target, practice: Practice, on_steps: OnSteps) -> float:
-    """Orbit error at the end of a free run from total rest; the simulation stays as it was."""
+def _trial(
+    simulation: Simulation,
+    practice: Practice,
+    start: Array | None,
+    judge: Judge,
+    on_steps: OnSteps,
+) -> float:
+    """Error at the end of a free run from a start; the simulation stays as it was."""
     before, step = simulation.snapshot(), simulation.timestep
     total, last = round(practice.trial / step), round(practice.trial_window / step)
-    simulation.reset()
+    if start is None:
+        simulation.reset()
+    else:
+        simulation.restore(start)
     try:
         simulation.rollout(total - last, record=())
-        outputs = simulation.rollout(last, record=("outputs",)).get("outputs")
-        return metrics.orbit_error(outputs, target)
+        return judge(simulation.rollout(last, record=("outputs",)).get("outputs"))
     except DivergenceError:
         return float("inf")
     finally:

@@ -79,6 +79,7 @@ class Lesson:
         inputs: times (T,) [s] -> (T, n_inputs); None: no input.
         weight: of the squared errors, a number or times (T,) [s] -> (T,).
         from_rest: begin at total rest and time 0, and leave the simulation as it was.
+        start: begin at this snapshot of the simulation, and leave it as it was.
         own_share: s in [0, 1]: s y + (1 - s) y* + noise is fed back, y the body's own outputs.
     """
 
@@ -88,12 +89,18 @@ class Lesson:
     inputs: Signal | None = None
     weight: float | Signal = 1.0
     from_rest: bool = False
+    start: Array | None = None
     own_share: float = 0.0
 
     def __post_init__(self) -> None:
         require_number("duration", self.duration, 0.0, open_low=True)
         require_number("washout", self.washout, 0.0)
         require_number("own_share", self.own_share, 0.0, 1.0)
+
+    @property
+    def elsewhere(self) -> bool:
+        """Whether it begins where the simulation is not."""
+        return self.from_rest or self.start is not None
 
 
 def teach(
@@ -140,8 +147,7 @@ def teach_lessons(
         DivergenceError: the body blew up under the teacher.
     """
     course = Course(simulation, teaching, seed)
-    for lesson in lessons:
-        course.attend(lesson, on_steps=on_steps)
+    course.attend_all(lessons, on_steps=on_steps)
     return course.fit()
 
 
@@ -164,7 +170,7 @@ class Course:
     """
 
     def __init__(self, simulation: Simulation, teaching: Teaching, seed: int) -> None:
-        self._simulation, self._teaching = simulation, teaching
+        self.simulation, self._teaching = simulation, teaching
         self._regression = Regression(bias=teaching.bias)
         self._noise = stream(seed, "teacher_noise")
         self._rest_noise = stream(seed, "rest_noise")
@@ -174,8 +180,15 @@ class Course:
         """The readout that serves all lessons so far best; the simulation runs it from now on."""
         ridge = self._teaching.ridge_per_row * self._regression.weight
         fit = self._regression.solve(ridge=ridge)
-        self._simulation.set_readout(fit.w_out)
+        self.simulation.set_readout(fit.w_out)
         return fit
+
+    def attend_all(
+        self, lessons: Iterable[Lesson], *, on_steps: OnSteps = lambda steps: None
+    ) -> None:
+        """One lesson after the other; see `attend`."""
+        for lesson in lessons:
+            self.attend(lesson, on_steps=on_steps)
 
     def attend(self, lesson: Lesson, *, on_steps: OnSteps = lambda steps: None) -> None:
         """Run a lesson and fold it in; memory does not grow with its duration.
@@ -183,21 +196,23 @@ class Course:
         Raises:
             DivergenceError: the body blew up; nothing of the lesson is then folded in.
         """
-        before = self._simulation.snapshot()
+        before = self.simulation.snapshot()
         if lesson.from_rest:
-            self._simulation.reset()
+            self.simulation.reset()
+        if lesson.start is not None:
+            self.simulation.restore(lesson.start)
         learnt = copy(self._regression)
         try:
             self._follow(lesson, learnt, on_steps)
         finally:
-            if lesson.from_rest:
-                self._simulation.restore(before)
+            if lesson.elsewhere:
+                self.simulation.restore(before)
         self._regression = learnt
 
     def _follow(self, lesson: Lesson, regression: Regression, on_steps: OnSteps) -> None:
-        step = self._simulation.timestep
+        step = self.simulation.timestep
         total, washout = round(lesson.duration / step), round(lesson.washout / step)
-        first = round(self._simulation.time / step)
+        first = round(self.simulation.time / step)
         for start in range(0, total, CHUNK):
             steps = np.arange(start, min(start + CHUNK, total))
             times = step * (first + steps).astype(np.float64)
@@ -212,10 +227,10 @@ class Course:
 
     def _lengths(self, lesson: Lesson, times: Array, clean: Array) -> Array:
         """Lengths (T, L) under the teacher, as the readout sees them."""
-        noise = self._rest_noise if lesson.from_rest else self._noise
+        noise = self._rest_noise if lesson.elsewhere else self._noise
         noisy = (1.0 - lesson.own_share) * clean
         noisy += self._teaching.noise * noise.standard_normal(clean.shape)
-        run = self._simulation.rollout(
+        run = self.simulation.rollout(
             inputs=None if lesson.inputs is None else lesson.inputs(times),
             offset=noisy,
             gate=lesson.own_share,

@@ -14,6 +14,7 @@ from mcmj.readout import Regression
 from mcmj.simulation import Simulation
 from mcmj.streams import stream
 from mcmj.targets import target
+from mcmj.teaching import Course, lessons_of
 
 QUICK = perturb.Config(
     settings=BodySettings(nodes=12),
@@ -169,7 +170,9 @@ def test_swing_up_starts_from_total_rest_and_is_measured_as_said():
     run = tasks["quadratic"]
     body, _, _ = swing_up.limit_cycle.get_body(SWING.of_seed(0))
     taught = Simulation(body, engine="twin")
-    fit = practise(taught, run.target, SWING.teaching, SWING.practice, 0).fit
+    course = Course(taught, SWING.teaching, 0)
+    course.attend_all(lessons_of(run.target, SWING.teaching))
+    fit = practise(course, run.target, SWING.practice).fit
     np.testing.assert_allclose(run.outputs[0], body.rest_lengths @ fit.w_out, atol=1e-5)
     assert run.swing_up_time == recovery_time(run.outputs, 1e-3, run.target)
     assert run.orbit_error == min(run.practice_errors)  # trials are runs like this one here

@@ -12,7 +12,7 @@ from mcmj.metrics import orbit_error
 from mcmj.practice import Practice, practise
 from mcmj.streams import stream
 from mcmj.targets import target
-from mcmj.teaching import Course, Lesson
+from mcmj.teaching import Course, Lesson, lessons_of
 
 STEP = 2e-3
 TAUGHT = Teaching(duration=20.0, washout=5.0, rest_runs=1, rest_duration=5.0, noise=0.1)
@@ -55,30 +55,52 @@ def test_a_lesson_that_blows_up_leaves_no_trace(body, w_out, goal):
     assert course.fit().w_out.tobytes() == first.w_out.tobytes()
 
 
+def taught_course(goal, teaching=TAUGHT, **options):
+    simulation = Simulation(random_body(0, nodes=12), timestep=STEP, engine="twin", **options)
+    course = Course(simulation, teaching, seed=1)
+    course.attend_all(lessons_of(goal, teaching))
+    return course
+
+
 def test_without_rounds_practice_is_teaching(goal):
-    body = random_body(0, nodes=12)
-    plain, simulation = (Simulation(body, timestep=STEP, engine="twin") for _ in range(2))
+    plain = Simulation(random_body(0, nodes=12), timestep=STEP, engine="twin")
     fit = teach(plain, goal, TAUGHT, seed=1)
-    practised = practise(simulation, goal, TAUGHT, replace(SHORT, rounds=0), seed=1)
+    course = taught_course(goal)
+    practised = practise(course, goal, replace(SHORT, rounds=0))
     assert practised.fit.w_out.tobytes() == fit.w_out.tobytes()
     assert len(practised.errors) == 1
-    assert np.array_equal(simulation.state.positions, plain.state.positions)
-    assert simulation.time == plain.time
+    assert np.array_equal(course.simulation.state.positions, plain.state.positions)
+    assert course.simulation.time == plain.time
 
 
 def test_the_best_round_is_kept_and_its_error_is_that_of_a_run_from_rest(goal):
-    simulation = Simulation(random_body(0, nodes=12), timestep=STEP, engine="twin")
-    practised = practise(simulation, goal, TAUGHT, replace(SHORT, good_enough=1e-9), seed=1)
+    course = taught_course(goal)
+    practised = practise(course, goal, replace(SHORT, good_enough=1e-9))
     assert len(practised.errors) == 3
-    simulation.reset()
-    outputs = simulation.rollout(7500, record=("outputs",)).outputs[-6000:]
+    course.simulation.reset()
+    outputs = course.simulation.rollout(7500, record=("outputs",)).outputs[-6000:]
     assert orbit_error(outputs, goal) == min(practised.errors)
-    assert np.array_equal(simulation.w_out, practised.fit.w_out)
+    assert np.array_equal(course.simulation.w_out, practised.fit.w_out)
+
+
+def test_other_starts_are_tried_too_and_the_worst_counts(goal):
+    """From a snapshot in motion, judged by the largest output instead."""
+    course = taught_course(goal)
+    start = course.simulation.snapshot()
+    practised = practise(
+        course, goal, replace(SHORT, rounds=1, good_enough=1e-9), starts=[start],
+        judge=lambda outputs: float(np.abs(outputs).max()),
+    )  # fmt: skip
+    largest = []
+    for begin in (course.simulation.reset, lambda: course.simulation.restore(start)):
+        begin()
+        outputs = course.simulation.rollout(7500, record=("outputs",)).outputs[-6000:]
+        largest.append(np.abs(outputs).max())
+    assert min(practised.errors) == max(largest)
 
 
 def test_practice_ends_when_it_is_good_enough(goal):
-    simulation = Simulation(random_body(0, nodes=12), timestep=STEP, engine="twin")
-    assert len(practise(simulation, goal, TAUGHT, replace(SHORT, good_enough=9.9), 1).errors) == 1
+    assert len(practise(taught_course(goal), goal, replace(SHORT, good_enough=9.9)).errors) == 1
 
 
 @pytest.mark.parametrize(
@@ -103,7 +125,9 @@ def test_bad_settings_are_named(name, value):
 @pytest.mark.slow
 def test_practice_makes_a_body_swing_up_that_teaching_alone_does_not():
     """Seed 10: Van der Pol from rest ends elsewhere after teaching alone."""
-    simulation = Simulation(random_body(10), engine="twin")
+    goal = target("van_der_pol")
     taught = Teaching(duration=120.0, rest_runs=2, rest_duration=30.0, rest_weight=1e-2)
-    practised = practise(simulation, target("van_der_pol"), taught, Practice(), seed=0)
+    course = Course(Simulation(random_body(10), engine="twin"), taught, seed=0)
+    course.attend_all(lessons_of(goal, taught))
+    practised = practise(course, goal, Practice())
     assert practised.errors[0] > 0.05 > 0.02 > min(practised.errors)

@@ -15,7 +15,7 @@ from mcmj.rates import success_rate
 from mcmj.simulation import Simulation
 from mcmj.streams import stream
 from mcmj.targets import Target, target
-from mcmj.teaching import Teaching
+from mcmj.teaching import Course, Teaching, lessons_of
 from mcmj.threads import in_threads
 from mcmj.validation import Array, require_count, require_number
 
@@ -189,12 +189,12 @@ def run(config: Config, *, on_steps: OnSteps = lambda steps: None) -> Result:
 def _swing_up(config: Config, body: Body, wanted: Target, seed: int, on_steps: OnSteps) -> SwingUp:
     """Readouts in body files are not used: they were taught to run, not to swing up."""
     simulation = Simulation(body, timestep=config.timestep, engine=config.engine)
+    course = Course(simulation, config.teaching, seed)
     try:
-        practised = practise(
-            simulation, wanted, config.teaching, config.practice, seed, on_steps=on_steps
-        )
+        course.attend_all(lessons_of(wanted, config.teaching), on_steps=on_steps)
     except DivergenceError:
         return SwingUp(wanted, np.zeros((0, 2)), np.inf, np.inf, (), None)
+    practised = practise(course, wanted, config.practice, on_steps=on_steps)
     outputs = _free_run(config, simulation, None, on_steps)
     speeds = stream(seed, "initial_state")
     kicked = [
