@@ -176,6 +176,11 @@ class Course:
         self._rest_noise = stream(seed, "rest_noise")
         self._length_noise = stream(seed, "length_noise")
 
+    @property
+    def regression(self) -> Regression:
+        """Of all lessons so far: it serves any ridge."""
+        return self._regression
+
     def fit(self) -> Fit:
         """The readout that serves all lessons so far best; the simulation runs it from now on."""
         ridge = self._teaching.ridge_per_row * self._regression.weight

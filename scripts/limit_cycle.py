@@ -38,7 +38,7 @@ def work(config: Config, output: Output, out: Path) -> None:
 def write(result: Result, out: Path) -> None:
     """metrics.json, body.xml with all readouts, trajectory.npz and the figure."""
     config, tasks = result.config, result.tasks
-    readouts = {name: task.w_out for name, task in tasks.items()}
+    readouts = result.readouts
     xml = to_mjcf(
         result.body,
         timestep=config.timestep,
@@ -68,6 +68,8 @@ def write_videos(result: Result, out: Path) -> None:
     """One MP4 a task, of the free run's last part; says in one line if there is no OpenGL."""
     try:
         for name, task in result.tasks.items():
+            if task.positions is None:
+                continue  # the twin records none
             last = len(task.positions)
             limit_cycle_video(
                 out / f"{name}.mp4",
@@ -98,10 +100,11 @@ def show(result: Result, out: Path) -> None:
         )
     console = Console()
     console.print(table)
-    console.print(
-        f"{result.body!r}: {result.steps_per_second:,.0f} steps a second in closed loop, "
-        f"{result.closed_loop_cost_ratio:.2f} x a bare mj_step loop"
-    )
+    if result.steps_per_second is not None:
+        console.print(
+            f"{result.body!r}: {result.steps_per_second:,.0f} steps a second in closed loop, "
+            f"{result.closed_loop_cost_ratio:.2f} x a bare mj_step loop"
+        )
     console.print(f"results in {out}")
 
 

@@ -23,6 +23,10 @@ from mcmj.threads import in_threads
 from mcmj.validation import Array
 
 
+# what a search over many bodies leaves out, see mcmj.search.experiment
+SEARCH_DEFAULTS = {"windows": 0.0, "measure_cost": False}
+
+
 @dataclass(frozen=True)
 class TaskResult:
     """One task: the fit (None if the readout came with the file), the free run, its errors.
@@ -30,7 +34,7 @@ class TaskResult:
     Attributes:
         times, outputs: (T,) [s] and (T, n_outputs) of the free run; its time goes on from
             teacher forcing, so the target's value at the same moment is target.sample(times).
-        positions: (window, N, 2) of the nodes during the last window [m].
+        positions: (window, N, 2) of the nodes during the last window [m]; None from the twin.
         windows: errors in consecutive windows, see mcmj.freerun.window_errors.
     """
 
@@ -39,21 +43,26 @@ class TaskResult:
     fit: Fit | None
     times: Array
     outputs: Array
-    positions: Array
+    positions: Array | None
     errors: dict[str, float]
     windows: dict[str, object]
 
 
 @dataclass(frozen=True)
 class Result:
-    """All tasks of one body, and what the closed loop costs."""
+    """All tasks of one body, and what the closed loop costs, if that was measured."""
 
     config: Config
     body: Body
     source: dict[str, object]
     tasks: dict[str, TaskResult]
-    steps_per_second: float
-    closed_loop_cost_ratio: float
+    steps_per_second: float | None
+    closed_loop_cost_ratio: float | None
+
+    @property
+    def readouts(self) -> dict[str, Array]:
+        """Readouts (L or L + 1, n_outputs) by task."""
+        return {name: task.w_out for name, task in self.tasks.items()}
 
     @property
     def metrics(self) -> dict[str, object]:
@@ -101,6 +110,8 @@ def run(
         if isinstance(outcome, DivergenceError):
             raise outcome
         tasks[name] = outcome
+    if not config.measure_cost:
+        return Result(config, body, source, tasks, None, None)
     w_out = next(iter(tasks.values())).w_out
     speed, ratio = closed_loop_cost(
         body, w_out, timestep=config.timestep, integrator=config.integrator
@@ -141,7 +152,9 @@ def _run_task(
     checkpoint: Checkpoint | None,
     on_steps: OnSteps,
 ) -> TaskResult:
-    simulation = Simulation(body, timestep=config.timestep, integrator=config.integrator)
+    simulation = Simulation(
+        body, timestep=config.timestep, integrator=config.integrator, engine=config.engine
+    )
     resumed = None if checkpoint is None else resume(simulation, checkpoint)
     if resumed is None:
         done, fit = None, _ready(simulation, config, wanted, w_out, on_steps)
@@ -152,7 +165,8 @@ def _run_task(
     first = free_run(
         simulation, total - last, done=done, checkpoint=checkpoint, fit=fit, on_steps=on_steps
     )
-    end = simulation.rollout(last, record=("outputs", "positions"))
+    seen = ("positions",) if config.engine == "mujoco" else ()
+    end = simulation.rollout(last, record=("outputs", *seen))
     on_steps(last)
     outputs = np.concatenate([first, end.get("outputs")])
     readout = simulation.w_out
@@ -164,9 +178,13 @@ def _run_task(
         fit=fit,
         times=config.timestep * np.arange(start, start + total, dtype=np.float64),
         outputs=outputs,
-        positions=end.get("positions"),
+        positions=end.positions,
         errors=_errors(outputs[-last:], config.timestep, wanted),
-        windows=window_errors(outputs, config.timestep, wanted),
+        windows=(
+            window_errors(outputs, config.timestep, wanted, length=config.windows)
+            if config.windows
+            else {}
+        ),
     )
 
 

@@ -15,7 +15,9 @@ from mcmj.bodyfile import (
     readouts_of_model,
     spring_law_of_model,
 )
+from mcmj.engines import ENGINES
 from mcmj.errors import InvalidArgumentError, McmjWarning, UnknownNameError
+from mcmj.freerun import WINDOW
 from mcmj.generator import BodySettings, draw_body
 from mcmj.library import body_path
 from mcmj.options import DEFAULT_INTEGRATOR
@@ -39,6 +41,10 @@ class Config:
         window: the errors are those of this last part of it [s].
         timestep: control and physics step [s].
         integrator: one of MuJoCo's.
+        engine: mujoco, or twin: faster, the same to rounding, no video.
+        windows: length of the consecutive windows of the free run whose errors are given too
+            [s]; 0: none.
+        measure_cost: measure what a step in closed loop costs in MuJoCo.
         settings: what a random body is drawn from.
         teaching: how the readout is taught.
     """
@@ -50,6 +56,9 @@ class Config:
     window: float = 20.0
     timestep: float = 1e-3
     integrator: str = DEFAULT_INTEGRATOR
+    engine: str = "mujoco"
+    windows: float = WINDOW
+    measure_cost: bool = True
     settings: BodySettings = field(default_factory=BodySettings)
     teaching: Teaching = field(default_factory=Teaching)
 
@@ -59,6 +68,9 @@ class Config:
         require_number("timestep", self.timestep, 0.0, open_low=True)
         require_number("free_run", self.free_run, 0.0, open_low=True)
         require_number("window", self.window, 0.0, self.free_run, open_low=True)
+        require_number("windows", self.windows, 0.0)
+        if self.engine not in ENGINES:
+            raise UnknownNameError("engine", self.engine, ENGINES)
         if self.body is not None and self.settings != BodySettings():
             changed = [
                 k for k, v in asdict(BodySettings()).items() if getattr(self.settings, k) != v
