@@ -1,19 +1,24 @@
 """Figs. 8 and 9: one body, four gaits; a switch of the readout is a switch of the gait."""
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 
 import numpy as np
 
+from mcmj import metrics
 from mcmj.body import Body
 from mcmj.errors import DivergenceError, UnknownNameError
 from mcmj.experiments.gaits_config import Config, check, get_body
 from mcmj.experiments.gaits_result import BodyResult, Result, Run, Taught, measure, outcome
 from mcmj.gaits import LEGS, gait_target
 from mcmj.mjcf import checked_readout
+from mcmj.practice import practise
 from mcmj.progress import OnSteps
+from mcmj.readout import Fit
 from mcmj.schedule import Phase, Schedule, run_schedule
 from mcmj.simulation import Simulation
-from mcmj.teaching import synchronise, teach
+from mcmj.targets import Target
+from mcmj.teaching import Course, lessons_of, synchronise
 from mcmj.validation import Array
 
 LOST = np.zeros((0, len(LEGS)))  # outputs of a run that blew up
@@ -56,9 +61,14 @@ def run_body(
             raise UnknownNameError("gait", name, config.gaits)
     given = {name: checked_readout(body, w, f"readout {name}") for name, w in readouts.items()}
     simulation = Simulation(body, timestep=config.timestep, engine=config.engine)
+    learnt = {
+        name: _learn(config, simulation, name, given.get(name), seed, on_steps)
+        for name in config.gaits
+    }
+    _practise_all(config, learnt, on_steps)
     gaits, running = {}, {}
-    for name in config.gaits:
-        gaits[name] = _run_gait(config, simulation, name, given.get(name), seed, on_steps)
+    for name, one in learnt.items():
+        gaits[name] = _run_gait(config, simulation, one, on_steps)
         running[name] = simulation.snapshot()
     switches = {}
     for first, second in config.pairs:
@@ -68,33 +78,78 @@ def run_body(
     return BodyResult(body, dict(source or {}), gaits, switches)
 
 
-def _run_gait(
+@dataclass
+class _Learnt:
+    """A gait after its lessons: course and fit if it was taught, and states on its cycle.
+
+    `w_out` is None, and there are no states, if the body blew up under the teacher.
+    """
+
+    target: Target
+    w_out: Array | None = None
+    course: Course | None = None
+    fit: Fit | None = None
+    states: tuple[Array, ...] = ()
+
+
+def _learn(
     config: Config,
     simulation: Simulation,
     name: str,
     w_out: Array | None,
     seed: int,
     on_steps: OnSteps,
-) -> Taught:
-    """Teach a gait, run from rest, then free; the simulation is left in the free run."""
-    wanted, fit = gait_target(name), None
+) -> _Learnt:
+    """Teach a gait, or bring the body onto it; then gather states all around its cycle."""
+    learnt = _Learnt(gait_target(name), w_out)
     simulation.reset()
     try:
         if w_out is None:
-            fit = teach(simulation, wanted, config.teaching, seed, on_steps=on_steps)
-            w_out = fit.w_out
+            learnt.course = Course(simulation, config.teaching, seed)
+            learnt.course.attend_all(lessons_of(learnt.target, config.teaching), on_steps=on_steps)
+            learnt.fit = learnt.course.fit()
+            learnt.w_out = learnt.fit.w_out
         else:
-            synchronise(simulation, wanted, config.teaching.washout)
-            simulation.set_readout(w_out)
+            synchronise(simulation, learnt.target, config.teaching.washout)
     except DivergenceError:
+        return _Learnt(learnt.target)
+    states = [simulation.snapshot()]
+    for _ in range(config.phases - 1):
+        synchronise(simulation, learnt.target, learnt.target.period / config.phases)
+        states.append(simulation.snapshot())
+    learnt.states = tuple(states)
+    return learnt
+
+
+def _practise_all(config: Config, learnt: Mapping[str, _Learnt], on_steps: OnSteps) -> None:
+    """Every gait that was taught practises to come up from rest and from the other gaits."""
+    for name, one in learnt.items():
+        if one.course is None:
+            continue
+        others = [state for other in learnt if other != name for state in learnt[other].states]
+
+        def judge(outputs: Array, wanted: Target = one.target) -> float:
+            period = metrics.relative_period_error(outputs, config.timestep, wanted)
+            return max(metrics.orbit_error(outputs, wanted), period)
+
+        practised = practise(
+            one.course, one.target, config.practice, starts=others, judge=judge, on_steps=on_steps
+        )
+        one.fit, one.w_out = practised.fit, practised.fit.w_out
+
+
+def _run_gait(config: Config, simulation: Simulation, learnt: _Learnt, on_steps: OnSteps) -> Taught:
+    """Run from rest, then free from the cycle; the simulation is left in the free run."""
+    wanted, w_out = learnt.target, learnt.w_out
+    if w_out is None:
         lost = measure(config, LOST, wanted)
-        return Taught(wanted, w_out, fit, lost, lost)
-    taught = simulation.snapshot()
+        return Taught(wanted, None, None, lost, lost)
+    simulation.set_readout(w_out)
     simulation.reset()
     from_rest = measure(config, _rollout(config, simulation, config.from_rest, on_steps), wanted)
-    simulation.restore(taught)
+    simulation.restore(learnt.states[0])
     free = measure(config, _rollout(config, simulation, config.free_run, on_steps), wanted)
-    return Taught(wanted, w_out, fit, free, from_rest)
+    return Taught(wanted, w_out, learnt.fit, free, from_rest)
 
 
 def _rollout(config: Config, simulation: Simulation, seconds: float, on_steps: OnSteps) -> Array:

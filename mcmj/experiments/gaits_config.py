@@ -10,6 +10,7 @@ from mcmj.errors import InvalidArgumentError, UnknownNameError
 from mcmj.gaits import GAITS, LEGS, gait_target
 from mcmj.generator import BodySettings, draw_body
 from mcmj.library import body_path
+from mcmj.practice import Practice
 from mcmj.teaching import Teaching
 from mcmj.validation import Array, require_count, require_number
 
@@ -44,6 +45,8 @@ class Config:
         engine: mujoco, or twin: faster, the same to rounding.
         settings: what a random body is drawn from.
         teaching: how the readouts are taught, each for itself.
+        practice: how each then practises from rest and from the other gaits.
+        phases: of each of the other gaits that it practises from.
     """
 
     gaits: tuple[str, ...] = tuple(GAITS)
@@ -60,6 +63,8 @@ class Config:
     engine: str = "mujoco"
     settings: BodySettings = DRAWN
     teaching: Teaching = field(default_factory=lambda: TAUGHT)
+    practice: Practice = field(default_factory=Practice)
+    phases: int = 3
 
     def __post_init__(self) -> None:
         for name in self.gaits:
@@ -70,6 +75,7 @@ class Config:
         if self.seed is not None:
             require_count("seed", self.seed, 0)
         require_count("seeds", self.seeds, 1)
+        require_count("phases", self.phases, 1)
         for name in ("before", "tolerance", "timestep", "window"):
             require_number(name, getattr(self, name), 0.0, open_low=True)
         for name in ("free_run", "after", "from_rest"):
@@ -117,6 +123,7 @@ def check(config: Config, body: Body) -> None:
 
 def total_steps(config: Config) -> int:
     """Control steps of a whole run if everything is taught, for a progress bar."""
-    of_a_gait = config.teaching.duration + config.free_run + config.from_rest
+    trials = (1 + config.phases * (len(config.gaits) - 1)) * config.practice.trial
+    of_a_gait = config.teaching.total + trials + config.free_run + config.from_rest
     seconds = len(config.gaits) * of_a_gait + len(config.pairs) * (config.before + config.after)
     return config.seeds * round(seconds / config.timestep)
