@@ -63,8 +63,8 @@ class Config:
     engine: str = "mujoco"
     settings: BodySettings = DRAWN
     teaching: Teaching = field(default_factory=lambda: TAUGHT)
-    practice: Practice = field(default_factory=Practice)
-    phases: int = 3
+    practice: Practice = field(default_factory=lambda: Practice(trial=60.0))
+    phases: int = 12
 
     def __post_init__(self) -> None:
         for name in self.gaits:
