@@ -43,7 +43,7 @@ class Checkpoint:
                 return None
             size = int(arrays.pop("steps")) * self._n_outputs
             values = np.fromfile(self._outputs, count=size)
-        except (OSError, ValueError, KeyError, BadZipFile):
+        except (OSError, ValueError, KeyError, EOFError, BadZipFile):
             return None  # none, or damaged
         return (arrays, values.reshape(-1, self._n_outputs)) if len(values) == size else None
 

@@ -79,9 +79,10 @@ def window_errors(
     """Orbit and period errors of consecutive whole windows of a free run, and their drift.
 
     Returns:
-        length [s]; orbit_errors and periods [s] of the windows; orbit_error_ratio, the last
-        window's over the second's; period_drift, (T_last - T_second) / T*, both None with
-        fewer than three windows; none of this if there is no whole window.
+        length [s]; orbit_errors and periods [s] of the windows (NaN: no rhythm);
+        orbit_error_ratio, the last window's over the second's; period_drift,
+        (T_last - T_second) / T*, both None with fewer than three windows; none of this if
+        there is no whole window.
     """
     require_number("length", length, metrics.PERIODS_NEEDED * target.period)
     rows = round(length / timestep)
@@ -89,7 +90,7 @@ def window_errors(
     if not windows:
         return {}
     errors = [metrics.orbit_error(window, target) for window in windows]
-    periods = [metrics.period(window, timestep, target.period) for window in windows]
+    periods = [metrics.period_or_nan(window, timestep, target) for window in windows]
     enough = len(windows) > 2
     return {
         "length": length,

@@ -53,7 +53,12 @@ class Practice:
         require_count("round_runs", self.round_runs, 1)
         for name in ("round_duration", "round_weight", "good_enough"):
             require_number(name, getattr(self, name), 0.0, open_low=True)
-        require_number("trial_window", self.trial_window, 0.0, self.trial, open_low=True)
+        require_number("trial", self.trial, 0.0, open_low=True)
+        require_number("trial_window", self.trial_window, 0.0, open_low=True)
+        if self.trial_window >= self.trial:
+            raise InvalidArgumentError(
+                "trial_window", f"less than the trial of {self.trial:g} s", self.trial_window
+            )
         if not self.own_shares:
             raise InvalidArgumentError("own_shares", "at least one share", self.own_shares)
         for share in self.own_shares:

@@ -42,7 +42,8 @@ class Phase:
         duration: [s].
         gate: of the feedback channels, a number or (n_outputs,); default 1 with a readout.
         offset: (n_outputs,) constant, added to the fed-back outputs.
-        freeze: channels whose output is held at the value it has as the phase begins.
+        freeze: channels that go on feeding back what they fed back last; in a schedule's first
+            phase, the output of that moment. They take no offset.
         forces: (N,) constant horizontal forces on the nodes [N], or RandomForces.
         length_noise: standard deviation of white noise, new every step, on the lengths that
             the readout sees [m].
@@ -68,7 +69,10 @@ class Phase:
         require_number("duration", self.duration, 0.0, open_low=True)
         require_number("length_noise", self.length_noise, 0.0)
         for name in ("freeze", "cut"):
-            for number in getattr(self, name):
+            numbers = getattr(self, name)
+            if not isinstance(numbers, Sequence):
+                raise InvalidArgumentError(name, "a tuple of numbers", repr(numbers))
+            for number in numbers:
                 require_count(name, number, 0)
         for name in ("offset", "masses"):
             if getattr(self, name) is not None:
@@ -136,6 +140,9 @@ class Schedule:
                     raise InvalidArgumentError(
                         "freeze", f"channels 0 to {body.n_outputs - 1}", channel
                     )
+                if phase.offset is not None and np.asarray(phase.offset)[channel] != 0.0:
+                    raise InvalidArgumentError("offset", f"0 for the frozen channel {channel}",
+                                               phase.offset)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -184,11 +191,15 @@ def run_schedule(
     if simulation.state.positions.ndim != 2:
         raise InvalidArgumentError("simulation", "a Simulation", type(simulation).__name__)
     schedule.check(simulation.body, simulation.timestep)
+    if any(phase.cut or phase.masses is not None for phase in schedule.phases):
+        _ = simulation.model  # only MuJoCo's bodies can change: said before anything runs
     forces, noise = stream(seed, "schedule_forces"), stream(seed, "schedule_noise")
     counts = schedule.steps(simulation.timestep)
-    parts, feedback = [], []
+    parts: list[Trajectory] = []
+    feedback: list[Array] = []
     for phase, steps in zip(schedule.phases, counts, strict=True):
-        for part, pushed in _run_phase(simulation, phase, steps, forces, noise, record):
+        last = feedback[-1][-1] if feedback else None
+        for part, pushed in _run_phase(simulation, phase, steps, last, forces, noise, record):
             parts.append(part)
             feedback.append(pushed)
             on_steps(len(part))
@@ -200,6 +211,7 @@ def _run_phase(
     simulation: Simulation,
     phase: Phase,
     steps: int,
+    last: Array | None,
     forces_of: np.random.Generator,
     noise_of: np.random.Generator,
     record: Sequence[str],
@@ -213,7 +225,7 @@ def _run_phase(
     forces = phase.forces
     if isinstance(forces, RandomForces):
         forces = forces_of.uniform(-forces.scale, forces.scale, body.n_nodes)
-    gate, constant = _gate_and_offset(simulation, phase)
+    gate, constant = _gate_and_offset(simulation, phase, last)
     w_out = simulation.w_out
     for start in range(0, steps, CHUNK):
         n = min(CHUNK, steps - start)
@@ -228,8 +240,10 @@ def _run_phase(
         yield part, gate * part.get("outputs") + offset
 
 
-def _gate_and_offset(simulation: Simulation, phase: Phase) -> tuple[Array, Array]:
-    """Gate and constant offset (n_outputs,) of a phase; frozen channels hold their output."""
+def _gate_and_offset(
+    simulation: Simulation, phase: Phase, last: Array | None
+) -> tuple[Array, Array]:
+    """Gate and constant offset (n_outputs,) of a phase; frozen channels hold what was `last`."""
     body, w_out = simulation.body, simulation.w_out
     gate = np.full(body.n_outputs, float(w_out is not None))
     if phase.gate is not None:
@@ -239,9 +253,14 @@ def _gate_and_offset(simulation: Simulation, phase: Phase) -> tuple[Array, Array
         offset[:] = phase.offset
     if phase.freeze:
         frozen = list(phase.freeze)
-        now = np.zeros(body.n_outputs)
-        if w_out is not None:
-            lengths = spring_lengths(simulation.state.positions, body.springs)
-            now = lengths @ w_out[: body.n_springs] + w_out[body.n_springs :].sum(axis=0)
-        gate[frozen], offset[frozen] = 0.0, now[frozen]
+        held = _outputs_now(simulation) if last is None else last
+        gate[frozen], offset[frozen] = 0.0, held[frozen]
     return gate, offset
+
+
+def _outputs_now(simulation: Simulation) -> Array:
+    body, w_out = simulation.body, simulation.w_out
+    if w_out is None:
+        return np.zeros(body.n_outputs)
+    lengths = spring_lengths(simulation.state.positions, body.springs)
+    return lengths @ w_out[: body.n_springs] + w_out[body.n_springs :].sum(axis=0)

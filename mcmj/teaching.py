@@ -27,8 +27,8 @@ class Teaching:
         noise: standard deviation of the white noise on the fed-back teacher signal (units of
             the output); the regression target stays clean. Without it the free run drifts off.
         length_noise: standard deviation of white noise on the lengths the readout sees [m].
-        ridge_per_row: ridge parameter over the number of rows; s^2 does what a length noise
-            of s would, without randomness.
+        ridge_per_row: ridge parameter over the number of rows (the sum of their weights); s^2
+            does what a length noise of s would, without randomness.
         bias: fit a constant too (the paper's readout has none).
         rest_runs: number of runs taught from total rest, without washout, beside the one
             above; they teach the body to swing up.
@@ -49,11 +49,7 @@ class Teaching:
 
     def __post_init__(self) -> None:
         require_number("duration", self.duration, 0.0, open_low=True)
-        require_number("washout", self.washout, 0.0)
-        if self.washout >= self.duration:
-            raise InvalidArgumentError(
-                "washout", f"less than the duration of {self.duration:g} s", self.washout
-            )
+        require_washout(self.washout, self.duration)
         for name in ("noise", "length_noise", "ridge_per_row"):
             require_number(name, getattr(self, name), 0.0)
         require_count("rest_runs", self.rest_runs, 0)
@@ -64,6 +60,13 @@ class Teaching:
     def total(self) -> float:
         """Of all runs together [s]."""
         return self.duration + self.rest_runs * self.rest_duration
+
+
+def require_washout(washout: float, duration: float) -> None:
+    """Raise unless 0 <= washout < duration [s]."""
+    require_number("washout", washout, 0.0)
+    if washout >= duration:
+        raise InvalidArgumentError("washout", f"less than the duration of {duration:g} s", washout)
 
 
 @dataclass(frozen=True)
@@ -94,8 +97,10 @@ class Lesson:
 
     def __post_init__(self) -> None:
         require_number("duration", self.duration, 0.0, open_low=True)
-        require_number("washout", self.washout, 0.0)
+        require_washout(self.washout, self.duration)
         require_number("own_share", self.own_share, 0.0, 1.0)
+        if self.from_rest and self.start is not None:
+            raise InvalidArgumentError("start", "None for a lesson from rest", "a snapshot")
 
     @property
     def elsewhere(self) -> bool:
@@ -200,7 +205,10 @@ class Course:
 
         Raises:
             DivergenceError: the body blew up; nothing of the lesson is then folded in.
+            InvalidArgumentError: a share of its own outputs for a body that has no readout.
         """
+        if lesson.own_share > 0 and self.simulation.w_out is None:
+            raise InvalidArgumentError("own_share", "0 before the first fit", lesson.own_share)
         before = self.simulation.snapshot()
         if lesson.from_rest:
             self.simulation.reset()

@@ -72,11 +72,13 @@ def lines(result: Result) -> list[tuple[str, str]]:
         ("largest Lyapunov exponent", f"{result.exponent.value:.1e} 1/s"),
         ("phase jitter per period", f"{result.diffusion.jitter:.1e}"),
         ("  at noise on lengths", f"{result.diffusion.noise:g} m"),
+        ("cycle closes to (RMS, relative)", f"{result.cycle.residual:.1e}"),
+        ("from total rest", "recovers" if result.rest_recovers else "does not recover"),
         ("starts that recover", f"{100 * result.starts.fraction:.1f} %"),
         ("  median, longest time", f"{np.median(times):.1f} s, {times.max():.1f} s"
          if times.size else "none"),
-        ("force tolerance (10 s)", f"{result.force.value:.3g} N"),
-        ("  with refined steps", f"{result.force_fine.value:.3g} N"),
+        ("force tolerance (10 s)", f"{result.force_fine.value:.3g} N"),
+        ("  at the body's own step", f"{result.force.value:.3g} N"),
         ("length noise tolerance (10 s)", f"{result.noise.value:.3g} m"),
         ("pushes judged alike by MuJoCo", f"{agreeing} of {of}"),
     ]  # fmt: skip

@@ -106,3 +106,12 @@ def test_windows_of_a_drifting_orbit():
     assert freerun.window_errors(outputs[:100], step, goal, length=length) == {}
     with pytest.raises(InvalidArgumentError, match="length"):
         freerun.window_errors(outputs, step, goal, length=1.0)
+
+
+def test_a_rhythm_that_dies_is_reported_not_raised():
+    goal = target("quadratic")
+    alive = goal.sample(0.01 * np.arange(2000))
+    windows = freerun.window_errors(np.vstack([alive, 0 * alive, 0 * alive]), 0.01, goal, length=20)
+    assert windows["periods"][0] == pytest.approx(goal.period, rel=1e-6)
+    assert np.isnan(windows["periods"][1:]).all()
+    assert windows["orbit_errors"][1] > 0.5

@@ -12,12 +12,15 @@ from mcmj.experiments.gaits_config import Config, get_body
 from mcmj.gaits import GAITS, gait_target
 from mcmj.generator import BodySettings
 from mcmj.library import body_names, body_path
+from mcmj.practice import Practice
 from mcmj.teaching import Teaching
 
 SMALL = BodySettings(nodes=20, n_outputs=4)
 QUICK = Config(
     gaits=("trot", "bound"), settings=SMALL, engine="twin", free_run=15.0, before=2.0, after=16.0,
-    from_rest=15.0, window=10.0, teaching=Teaching(duration=20.0, washout=5.0, ridge_per_row=1e-6),
+    from_rest=15.0, window=10.0, phases=1,
+    practice=Practice(rounds=0, trial=12.0, trial_window=10.0),
+    teaching=Teaching(duration=20.0, washout=5.0, ridge_per_row=1e-6),
 )  # fmt: skip
 
 
@@ -73,6 +76,7 @@ def test_rates_over_seeds():
     short = Config(
         gaits=("bound",), seeds=2, settings=SMALL, engine="twin", teaching=QUICK.teaching,
         free_run=10.0, after=10.0, from_rest=10.0, window=10.0,
+        practice=QUICK.practice,
     )  # fmt: skip
     table = gaits.run(short).metrics["seeds"]
     assert [one["seed"] for one in table["outcomes"]] == [0, 1]
@@ -88,7 +92,7 @@ def test_a_body_that_blows_up_does_not_walk(monkeypatch):
     monkeypatch.setattr(gaits, "run_schedule", blow_up)
     lost = gaits.run(QUICK).metrics["switch"]["trot_to_bound"]
     assert lost["orbit_error"] == lost["switching_time"] == np.inf
-    monkeypatch.setattr(gaits, "teach", blow_up)
+    monkeypatch.setattr(gaits.Course, "attend_all", blow_up)
     table = gaits.run(QUICK).metrics
     assert table["trot"]["orbit_error"] == table["trot"]["from_rest"]["orbit_error"] == np.inf
 

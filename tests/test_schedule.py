@@ -54,8 +54,8 @@ def test_a_frozen_output_is_constant_and_what_the_twin_does_with_it(body, readou
     held = result.feedback[200:400]
     assert np.ptp(held[:, 0]) == 0.0
     assert np.ptp(held[:, 1]) > 1e-6
-    first = result.trajectory.outputs[200]
-    np.testing.assert_allclose(held[0], first, rtol=1e-12)  # no jump as the phase begins
+    first = result.feedback[199]
+    assert held[0, 0] == first[0]  # no jump as the phase begins
     before = moving(body, weights)
     before.rollout(200)
     state = before.state
@@ -151,10 +151,22 @@ def test_cut_springs_and_changed_masses_are_the_twins(body, w_out, springs, inte
     assert np.abs(result.trajectory.lengths[100:] - whole[100:]).max() > 1e-4
 
 
+def test_a_channel_frozen_again_stays_where_it_is(body, w_out):
+    result = run(body, w_out, Phase(0.1), Phase(0.1, freeze=(0,)), Phase(0.1, freeze=(0, 1)))
+    assert np.ptp(result.feedback[99:, 0]) == 0.0
+    assert np.ptp(result.feedback[199:, 1]) == 0.0
+
+
+def test_a_schedule_that_begins_frozen_holds_the_output_of_that_moment(body, w_out):
+    result = run(body, w_out, Phase(0.1, freeze=(0,)))
+    np.testing.assert_allclose(result.feedback[0, 0], result.trajectory.outputs[0, 0], rtol=1e-12)
+
+
 def test_the_twin_engine_says_that_bodies_do_not_change(body, w_out):
     simulation = Simulation(body, w_out=w_out, engine="twin")
-    with pytest.raises(InvalidArgumentError, match="'mujoco' for bodies that change"):
-        run_schedule(simulation, Schedule([Phase(0.05, cut=(0,))]), 0)
+    with pytest.raises(InvalidArgumentError, match="'mujoco', which has a model"):
+        run_schedule(simulation, Schedule([Phase(0.05), Phase(0.05, cut=(0,))]), 0)
+    assert simulation.time == 0.0
 
 
 def test_without_a_readout_phases_are_open_loop(body):
@@ -169,6 +181,7 @@ def test_without_a_readout_phases_are_open_loop(body):
         {"duration": 0.0},
         {"length_noise": -1.0},
         {"freeze": (-1,)},
+        {"freeze": 0},
         {"cut": (0.5,)},
         {"forces": [np.nan]},
         {"offset": "high"},
@@ -193,6 +206,7 @@ def test_a_schedule_holds_phases(phases):
     "wrong",
     [
         {"freeze": (2,)},
+        {"freeze": (1,), "offset": [0.0, 1.0]},
         {"cut": (999,)},
         {"forces": [1.0]},
         {"masses": np.zeros(8)},

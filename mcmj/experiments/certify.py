@@ -31,7 +31,8 @@ from mcmj.stability.tolerance import Tolerance, force_tolerance, noise_tolerance
 from mcmj.streams import stream
 from mcmj.targets import TARGETS, Target, target
 from mcmj.teaching import Teaching, synchronise, teach
-from mcmj.validation import Array, require_count, require_number
+from mcmj.twin.population import rest as rest_state
+from mcmj.validation import Array, as_array, require_above, require_count, require_number
 
 STAGES = ("run", "floquet", "lyapunov", "phase", "starts", "kicks", "pushes", "force", "noise")
 
@@ -49,7 +50,7 @@ class Config:
         window: [s].
         recovery: time to come back to the orbit [s].
         threshold: largest orbit error of a recovery.
-        scales: of the target that the teacher starts the body with.
+        scales: of the target that the teacher starts the body with, > 0.
         phases: at which it lets go, for each scale.
         kicks: RMS velocity kicks, in units of the nodes' RMS speed on the cycle.
         pushes: amplitudes F of random constant forces in [-F, F] for 1 s [N].
@@ -66,7 +67,7 @@ class Config:
     window: float = 20.0
     recovery: float = 40.0
     threshold: float = 0.05
-    scales: tuple[float, ...] = (0.0, 0.1, 0.25, 0.5, 0.75, 1.0, 1.25, 1.5, 2.0, 2.5, 3.0)
+    scales: tuple[float, ...] = (0.1, 0.25, 0.5, 0.75, 1.0, 1.25, 1.5, 2.0, 2.5, 3.0)
     phases: int = 24
     kicks: tuple[float, ...] = (0.25, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0)
     pushes: tuple[float, ...] = (1.0, 3.0, 10.0, 30.0, 100.0, 300.0)
@@ -78,9 +79,17 @@ class Config:
     def __post_init__(self) -> None:
         if self.task not in TARGETS:
             raise UnknownNameError("task", self.task, TARGETS)
-        for name in ("recovery", "threshold", "diffusion_noise"):
+        for name in ("threshold", "diffusion_noise"):
             require_number(name, getattr(self, name), 0.0, open_low=True)
-        require_number("window", self.window, 0.0, self.free_run, open_low=True)
+        if self.seed is not None:
+            require_count("seed", self.seed, 0)
+        period = target(self.task).period
+        require_number("window", self.window, metrics.PERIODS_NEEDED * period, self.free_run)
+        require_number("recovery", self.recovery, 3 * period)
+        for name in ("scales", "kicks", "pushes"):
+            levels = as_array(name, getattr(self, name), (None,))
+            require_above(name, levels, 0.0)
+            require_count(f"number of {name}", len(levels), 1)
         for name, low in (("phases", 1), ("copies", 4), ("refine", 1)):
             require_count(name, getattr(self, name), low)
 
@@ -106,8 +115,10 @@ class Result:
         mujoco_monodromy_error: of the phase's and the leading direction, |D d - M d| / |d|.
         starts, kicks, pushes: surveys of scales x phases, kicks x copies, pushes x copies.
         start_outputs: (B, n_outputs) of the starts' states.
+        rest_recovers: whether the loop comes to the orbit from total rest.
         mujoco_agrees: of a sample of pushes: how many MuJoCo judges as the twin does, of how many.
-        force, force_fine: tolerance at the body's own step, and with `refine`.
+        force, force_fine: tolerance at the body's own step, where Euler may fail before the body
+            does, and with `refine`.
     """
 
     config: Config
@@ -123,6 +134,7 @@ class Result:
     diffusion: Diffusion
     starts: Survey
     start_outputs: Array
+    rest_recovers: bool
     kicks: Survey
     pushes: Survey
     mujoco_agrees: tuple[int, int]
@@ -149,6 +161,7 @@ class Result:
             "target_leading_nontrivial": None if wanted is None else float(abs(wanted[1])),
             "basin_fraction": self.starts.fraction,
             "start_recovery_time": self.starts.median_time,
+            "rest_recovers": self.rest_recovers,
             "kick_recovery": self.kicks.table(self.config.kicks),
             "push_recovery": self.pushes.table(self.config.pushes),
             "mujoco_pushes_agreeing": list(self.mujoco_agrees),
@@ -157,9 +170,14 @@ class Result:
             "phase_diffusion": self.diffusion.coefficient,
             "phase_jitter_per_period": self.diffusion.jitter,
             "phase_diffusion_noise": self.diffusion.noise,
-            "force_tolerance": self.force.value,
-            "force_tolerance_refined": self.force_fine.value,
+            "force_tolerance": self.force_fine.value,
+            "force_tolerance_own_step": self.force.value,
             "noise_tolerance": self.noise.value,
+            "tolerances_tried": {
+                "forces": _tried(self.force_fine),
+                "forces_own_step": _tried(self.force),
+                "noise": _tried(self.noise),
+            },
         }
 
 
@@ -214,7 +232,7 @@ def _certified(
 ) -> Result:
     seed, copies = config.noise_seed, config.copies
     how: dict[str, Any] = {"threshold": config.threshold, "recovery": config.recovery, "seed": seed}
-    cycle = find_cycle(loop, start, goal.period)
+    cycle = _cycle(config, goal, loop, start)
     analysis = floquet(loop, cycle)
     confirmed = monodromy_error(loop, cycle, analysis)
     on_stages(1)
@@ -230,6 +248,8 @@ def _certified(
         duration=config.teaching.washout,
     )  # fmt: skip
     starts = _survey(config, loop, goal, begun)
+    rest = loop.vector(rest_state(loop.body))[None]
+    rest_recovers = bool(_survey(config, loop, goal, rest).recovered[0])
     on_stages(1)
     generator = stream(seed, "initial_state")
     hit = kicked(loop, cycle, np.repeat(config.kicks, copies), generator)
@@ -246,8 +266,26 @@ def _certified(
     return Result(
         config, loop.body, goal, cycle, errors, outputs, analysis,
         None if goal.rhs is None else target_multipliers(goal), confirmed, exponent, diffusion,
-        starts, loop.outputs(begun), kicks, pushes, agrees, force, fine, noise,
+        starts, loop.outputs(begun), rest_recovers, kicks, pushes, agrees, force, fine, noise,
     )  # fmt: skip
+
+
+def _cycle(config: Config, goal: Target, loop: ClosedLoop, start: Array) -> Cycle:
+    """The settled cycle, which must still be the taught one."""
+    cycle = find_cycle(loop, start, goal.period)
+    outputs = loop.run(cycle.state[None], round(2 * cycle.period / loop.timestep)).outputs[0]
+    error = metrics.orbit_error(outputs, goal)
+    if error >= config.threshold:
+        raise McmjError(
+            f"the loop leaves the orbit in the long run: the cycle it settles on is off by "
+            f"{100 * error:.3g} % (threshold {100 * config.threshold:g} %)"
+        )
+    return cycle
+
+
+def _tried(tolerance: Tolerance) -> list[dict[str, float]]:
+    """Fractions recovered at the amplitudes that a bisection tried."""
+    return [{"amplitude": a, "recovered": tolerance.tried[a]} for a in sorted(tolerance.tried)]
 
 
 def _survey(config: Config, loop: ClosedLoop, goal: Target, states: Array) -> Survey:
@@ -266,7 +304,9 @@ def _pushes(
     states = states[order]  # every strength at phases all over the cycle
     result = _survey(config, loop, goal, pushed(loop, states, forces, 1.0, refine=config.refine))
     some = slice(None, None, copies)
-    agreement = verdicts(loop, goal, states[some], forces[some], 1.0, config.recovery)
+    agreement = verdicts(
+        loop, goal, states[some], forces[some], 1.0, config.recovery, config.threshold
+    )
     return result, agreement
 
 

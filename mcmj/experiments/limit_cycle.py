@@ -22,7 +22,6 @@ from mcmj.teaching import synchronise, teach
 from mcmj.threads import in_threads
 from mcmj.validation import Array
 
-
 # what a search over many bodies leaves out, see mcmj.search.experiment
 SEARCH_DEFAULTS = {"windows": 0.0, "measure_cost": False}
 

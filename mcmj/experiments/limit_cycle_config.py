@@ -15,12 +15,11 @@ from mcmj.bodyfile import (
     readouts_of_model,
     spring_law_of_model,
 )
-from mcmj.engines import ENGINES
 from mcmj.errors import InvalidArgumentError, McmjWarning, UnknownNameError
 from mcmj.freerun import WINDOW
 from mcmj.generator import BodySettings, draw_body
 from mcmj.library import body_path
-from mcmj.options import DEFAULT_INTEGRATOR
+from mcmj.options import DEFAULT_INTEGRATOR, ENGINES
 from mcmj.spring_laws import NATIVE
 from mcmj.targets import TARGETS, Target
 from mcmj.teaching import Teaching

@@ -38,6 +38,7 @@ class Config:
     Attributes:
         task: van_der_pol, quadratic or lissajous.
         body: a body file, or the name of a body that comes with mcmj; default: a random body.
+            It is always taught: readouts in the file are not used.
         seed: of the random body, the noises and the forces.
         seeds: number of bodies of consecutive seeds for the table of successes.
         before, window, after: lengths of the phases: undisturbed, disturbed, free again [s].
@@ -81,8 +82,9 @@ class Config:
             require_number("noise_curve", std, 0.0, open_low=True)
         if self.body is not None and (self.settings != DRAWN or self.seeds > 1):
             raise InvalidArgumentError("body", "no settings or seeds beside it", self.body)
-        if self.after < 2 * target(self.task).period:
-            raise InvalidArgumentError("after", "at least two periods of the task", self.after)
+        period = target(self.task).period
+        require_number("after", self.after, 2 * period)
+        require_number("error_window", self.error_window, metrics.PERIODS_NEEDED * period)
 
     @property
     def perturbations(self) -> dict[str, Phase]:
@@ -163,7 +165,7 @@ class Result:
         return table
 
     def over_seeds(self, name: str) -> dict[str, object]:
-        """How many bodies recover from a perturbation, and how fast those that stay do."""
+        """How many bodies recover from a perturbation, and how fast: the median of all."""
         of_all = [body.recoveries[name] for body in self.bodies]
         errors, times = [r.orbit_error for r in of_all], [r.recovery_time for r in of_all]
         return {

@@ -6,7 +6,7 @@ import numpy as np
 
 from mcmj import metrics
 from mcmj.body import Body
-from mcmj.errors import DivergenceError
+from mcmj.errors import DivergenceError, InvalidArgumentError
 from mcmj.experiments import limit_cycle
 from mcmj.generator import BodySettings
 from mcmj.practice import Practice, practise
@@ -67,6 +67,8 @@ class Config:
         require_count("kicks", self.kicks, 0)
         require_number("kick_speed", self.kick_speed, 0.0)
         require_number("tolerance", self.tolerance, 0.0, open_low=True)
+        if self.body is not None and self.seeds > 1:
+            raise InvalidArgumentError("seeds", "1 beside a body", self.seeds)
         self.of_seed(0)  # checks the rest
 
     def of_seed(self, index: int) -> limit_cycle.Config:

@@ -1,8 +1,8 @@
 """Region of attraction: from where, and after which blows, the loop comes back to its orbit.
 
 A copy has recovered if it is finite and its orbit error (`metrics.orbit_error`) over the last
-part of the run is below a threshold. Its recovery time is the moment after which every output
-stays within the threshold (over the RMS radius) of the target orbit.
+part of the run is below a threshold. Its recovery time is `metrics.recovery_time` with the same
+threshold: infinite too for a copy whose orbit is good in the mean but strays further at a place.
 """
 
 from collections.abc import Sequence
@@ -10,7 +10,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
-from scipy.spatial import cKDTree
 
 from mcmj import metrics
 from mcmj.stability.cycle import Cycle
@@ -28,7 +27,7 @@ class Survey:
 
     Attributes:
         errors: (B,) orbit error of the last part; infinite where a copy blew up.
-        times: (B,) recovery time [s]; infinite where it did not recover.
+        times: (B,) recovery time [s]; infinite where the outputs do not stay within.
         threshold: largest orbit error of a recovery.
     """
 
@@ -119,16 +118,13 @@ def judge(
 ) -> Survey:
     """Errors and recovery times of outputs (B, T, n_outputs), whichever engine made them."""
     stride = max(1, round(SPARSE / timestep))
-    sparse = outputs[:, ::stride]
-    last = round(window / (stride * timestep))
-    orbit = target.orbit(metrics.ORBIT_POINTS)
-    tree, limit = cKDTree(orbit), threshold * metrics.rms_radius(orbit)
+    sparse, spacing = outputs[:, ::stride], stride * timestep
+    last = round(window / spacing)
     errors, times = np.full(len(outputs), np.inf), np.full(len(outputs), np.inf)
     for b in np.flatnonzero(alive):
         errors[b] = metrics.orbit_error(sparse[b, -last:], target)
         if errors[b] < threshold:
-            away = np.flatnonzero(tree.query(sparse[b])[0] > limit)
-            times[b] = (away[-1] + 1) * stride * timestep if away.size else 0.0
+            times[b] = metrics.recovery_time(sparse[b], spacing, target, tolerance=threshold)
     return Survey(errors, times, threshold)
 
 

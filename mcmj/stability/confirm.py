@@ -3,6 +3,7 @@
 import numpy as np
 
 from mcmj.ensemble import Ensemble
+from mcmj.errors import DivergenceError
 from mcmj.stability.basin import judge, pushed, survey
 from mcmj.stability.cycle import Cycle, weights_at
 from mcmj.stability.floquet import Floquet
@@ -56,7 +57,7 @@ def verdicts(
     """Pushes that MuJoCo judges as the twin does, and how many were compared.
 
     Copies (B, n) are pushed by constant forces (B, N) [N] for `hold` [s], without refined
-    steps; compared are those that the twin survives, for MuJoCo raises where one blows up.
+    steps; compared are those that the twin survives. None agrees if MuJoCo blows up in one.
     """
     twin = survey(
         loop, target, pushed(loop, states, forces, hold), duration=recovery, threshold=threshold
@@ -66,8 +67,11 @@ def verdicts(
         return 0, 0
     ensemble = _ensemble(loop, states[alive])
     rows = np.repeat(forces[alive, None], round(hold / loop.timestep), axis=1)
-    ensemble.rollout(forces=rows, record=())
-    free = ensemble.rollout(round(recovery / loop.timestep), record=("outputs",))
+    try:
+        ensemble.rollout(forces=rows, record=())
+        free = ensemble.rollout(round(recovery / loop.timestep), record=("outputs",))
+    except DivergenceError:
+        return 0, len(alive)
     judged = judge(
         free.get("outputs"), np.ones(len(alive), np.bool_), loop.timestep, target,
         2 * target.period, threshold,

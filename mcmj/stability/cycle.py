@@ -79,11 +79,11 @@ def find_cycle(
         guess: expected period [s], right within 20 %.
         settle: let transients die for so long [s] before each attempt.
         tolerance: largest residual.
-        rounds: attempts; the last one is returned, whatever its residual.
+        rounds: attempts.
 
     Raises:
         DivergenceError: the loop blew up.
-        McmjError: the loop rests, or does not come back.
+        McmjError: the loop rests, does not come back, or has not settled after all attempts.
     """
     require_number("guess", guess, 2 * loop.timestep)
     state = np.asarray(start)[None]
@@ -91,14 +91,19 @@ def find_cycle(
         state = loop.advance(state, max(1, round(settle / loop.timestep)))
         cycle = _cycle_at(loop, state, guess)
         if cycle.residual <= tolerance:
-            break
-    return cycle
+            return cycle
+    raise McmjError(
+        f"no settled cycle after {rounds * settle:g} s: the state misses itself by "
+        f"{cycle.residual:.2g} of its excursion after a period of {cycle.period:.5g} s"
+    )
 
 
 def _cycle_at(loop: ClosedLoop, state: Array, guess: float) -> Cycle:
     h = loop.timestep
     outputs = loop.run(state, round(6 * guess / h)).outputs[0]
     rough = metrics.period(outputs, h, guess)
+    if np.isnan(rough):
+        raise McmjError(f"the loop has no rhythm with a period near {guess:.4g} s")
     steps = round(rough / h) - 1
     before, here, after = (loop.advance(state, k)[0] for k in range(3))
     tangent = (after - before) / (2 * h)

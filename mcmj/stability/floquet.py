@@ -54,7 +54,7 @@ class Floquet:
 
     @property
     def leading_nontrivial(self) -> float:
-        """Largest magnitude but for the phase's; below 1 proves that the cycle is stable."""
+        """Largest magnitude but for the phase's; below 1 the cycle is stable."""
         return float(abs(self.multipliers[1]))
 
 

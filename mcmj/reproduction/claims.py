@@ -1,0 +1,155 @@
+"""What the paper claims, which command shows it, and when it holds.
+
+Figures and sections are those of Hauser et al., Biol. Cybern. 106 (2012) 595-613. The paper shows
+single bodies and gives few numbers; where it gives none, its claim stands in words.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from mcmj.errors import McmjError, UnknownNameError
+from mcmj.rates import success_rate
+
+FORMATS = {"error": "{:.2%}", "time": "{:.1f} s", "ratio": "{:.3f}"}
+
+
+@dataclass(frozen=True)
+class Run:
+    """One command.
+
+    Attributes:
+        name: of its folder.
+        script: in scripts/, without suffix.
+        full, quick: its options; None: not run in that mode.
+    """
+
+    name: str
+    script: str
+    full: tuple[str, ...]
+    quick: tuple[str, ...] | None
+
+
+@dataclass(frozen=True)
+class Claim:
+    """A claim and the numbers that decide it.
+
+    Attributes:
+        text: what is claimed.
+        paper: the paper's value, or its words.
+        run: name of the run whose metrics hold ours.
+        paths: dotted paths in them, each to a number or a list of numbers; all are taken together.
+        kind: of number, one of FORMATS.
+        limit: a value at or below it is a success; None counts as a failure.
+        needed: share of successes with which the claim holds.
+    """
+
+    text: str
+    paper: str
+    run: str
+    paths: tuple[str, ...]
+    kind: str = "error"
+    limit: float = 0.05
+    needed: float = 0.9
+
+
+@dataclass(frozen=True)
+class Part:
+    """A figure of the paper, or a section."""
+
+    name: str
+    title: str
+    runs: tuple[Run, ...]
+    claims: tuple[Claim, ...]
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """A claim with what came out.
+
+    Attributes:
+        values: our values, infinite where there is none.
+        rate: counts of successes, see mcmj.rates.
+        holds: whether enough of them are successes.
+    """
+
+    claim: Claim
+    values: tuple[float, ...]
+    rate: dict[str, Any]
+    holds: bool
+
+    @property
+    def ours(self) -> str:
+        """Median and range, for people."""
+        show = FORMATS[self.claim.kind].format
+        texts = [show(v) if np.isfinite(v) else "never" for v in sorted(self.values)]
+        if len(texts) == 1:
+            return texts[0]
+        median = float(np.median(self.values))
+        middle = show(median) if np.isfinite(median) else "never"
+        return f"{middle} ({texts[0]} to {texts[-1]})"
+
+    @property
+    def plain(self) -> dict[str, object]:
+        """As written to metrics.json."""
+        finite = [v if np.isfinite(v) else None for v in self.values]
+        return {
+            "claim": self.claim.text,
+            "paper": self.claim.paper,
+            "values": finite,
+            "median": float(np.median(self.values)),
+            "success": self.rate,
+            "limit": self.claim.limit,
+            "holds": self.holds,
+        }
+
+
+def judge(claim: Claim, metrics: Mapping[str, object]) -> Outcome:
+    """Look up a claim's numbers in a run's metrics and count the successes.
+
+    Raises:
+        McmjError: the metrics have no such number.
+    """
+    values = tuple(value for path in claim.paths for value in numbers_at(metrics, path))
+    good = [value <= claim.limit for value in values]
+    return Outcome(claim, values, success_rate(good), sum(good) >= claim.needed * len(good))
+
+
+def numbers_at(metrics: Mapping[str, object], path: str) -> list[float]:
+    """Numbers at a dotted path, a null being infinite; `*` stands for every key or item.
+
+    Raises:
+        McmjError: there is nothing, or no number, at that path.
+    """
+    found: list[object] = [metrics]
+    for key in path.split("."):
+        found = [inner for outer in found for inner in _inside(outer, key, path)]
+    items = [item for each in found for item in (each if isinstance(each, list) else [each])]
+    if not items or not all(item is None or isinstance(item, int | float) for item in items):
+        raise McmjError(f"metric {path!r} is no number, and no list of numbers")
+    return [np.inf if item is None else float(item) for item in items]  # type: ignore[arg-type]
+
+
+def _inside(outer: object, key: str, path: str) -> list[object]:
+    if key == "*" and isinstance(outer, Mapping):
+        return list(outer.values())
+    if key == "*" and isinstance(outer, list):
+        return outer
+    if isinstance(outer, Mapping) and key in outer:
+        return [outer[key]]
+    raise McmjError(f"no metric {path!r}: {key!r} is missing")
+
+
+def chosen(parts: Sequence[Part], only: Sequence[str]) -> list[Part]:
+    """The parts with these names; all without any.
+
+    Raises:
+        UnknownNameError: no such part.
+    """
+    names = [part.name for part in parts]
+    for name in only:
+        if name not in names:
+            raise UnknownNameError("part", name, names)
+    return [part for part in parts if not only or part.name in only]
