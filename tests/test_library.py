@@ -17,7 +17,7 @@ SPECIALISED = {"van_der_pol": (10, 22), "quadratic": (20, 51), "lissajous": (20,
 
 @pytest.mark.parametrize(("name", "size"), SPECIALISED.items())
 def test_specialised_bodies_have_the_papers_sizes_and_run_their_cycle(name, size):
-    """Run free on the twin for 60 s from the cycle, and from total rest, to the last 20 s."""
+    """Run free on the twin for 80 s from the cycle, and from total rest, to the last 20 s."""
     body, w_out = mcmj.from_mjcf(body_path(name))
     assert (body.n_nodes, body.n_springs) == size
     simulation = mcmj.Simulation(body, engine="twin")
@@ -26,7 +26,7 @@ def test_specialised_bodies_have_the_papers_sizes_and_run_their_cycle(name, size
     simulation.set_readout(w_out)
     for begin in (lambda: None, simulation.reset):
         begin()
-        simulation.rollout(40_000, record=())
+        simulation.rollout(60_000, record=())
         outputs = simulation.rollout(20_000, record=("outputs",)).outputs
         assert orbit_error(outputs, goal) < 0.01
 
