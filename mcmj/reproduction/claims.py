@@ -43,7 +43,8 @@ class Claim:
         paths: dotted paths in them, each to a number or a list of numbers; all are taken together.
         kind: of number, one of FORMATS.
         limit: a value at or below it is a success; None counts as a failure.
-        needed: share of successes with which the claim holds.
+        needed: the claim holds unless the successes refute this rate: unless the upper end of
+            their 95 % Wilson interval is below it; 1: all must succeed.
     """
 
     text: str
@@ -114,7 +115,9 @@ def judge(claim: Claim, metrics: Mapping[str, object]) -> Outcome:
     """
     values = tuple(value for path in claim.paths for value in numbers_at(metrics, path))
     good = [value <= claim.limit for value in values]
-    return Outcome(claim, values, success_rate(good), sum(good) >= claim.needed * len(good))
+    rate: dict[str, Any] = success_rate(good)
+    holds = all(good) if claim.needed == 1.0 else rate["interval_95"][1] >= claim.needed
+    return Outcome(claim, values, rate, holds)
 
 
 def numbers_at(metrics: Mapping[str, object], path: str) -> list[float]:
