@@ -87,6 +87,7 @@ def draw_phase_plane(axes: Axes, outputs: Array, target: Target) -> None:
     axes.plot(outputs[:, 0], outputs[:, 1], color="black", lw=0.8)
     axes.set(aspect="equal", xlabel="$x_1$", ylabel="$x_2$")
     axes.margins(0.12)
+    axes.locator_params(axis="x", nbins=4)
 
 
 def limit_cycle_figure(
