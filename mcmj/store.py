@@ -4,6 +4,7 @@ import dataclasses
 import json
 import os
 import platform
+import shutil
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from importlib.metadata import PackageNotFoundError, version
@@ -64,6 +65,25 @@ def whole_file(path: str | Path) -> Iterator[Path]:
             temporary.unlink(missing_ok=True)
 
 
+@contextmanager
+def whole_folder(path: str | Path) -> Iterator[Path]:
+    """As `whole_file`, for a file format that is a folder.
+
+    Raises:
+        OutputError: the disk or the folder does not take it.
+    """
+    final = Path(path)
+    temporary = final.with_name(f".{os.getpid()}-{final.name}")
+    try:
+        yield temporary
+        shutil.rmtree(final, ignore_errors=True)
+        os.replace(temporary, final)
+    except OSError as error:
+        raise OutputError(f"cannot write {final}: {error.strerror or error}") from error
+    finally:
+        shutil.rmtree(temporary, ignore_errors=True)
+
+
 def write_text(path: str | Path, text: str) -> None:
     """Write a text file, whole or not at all."""
     with whole_file(path) as temporary:
@@ -91,10 +111,15 @@ def write_arrays(
     for name, array in arrays.items():
         if np.asarray(array).dtype.hasobject:
             raise InvalidArgumentError(f"arrays[{name!r}]", "numbers, not Python objects", array)
-    account = {"config": plain(config), "seed": seed, "versions": versions()}
     with whole_file(path) as temporary, temporary.open("wb") as file:
-        contents: dict[str, Any] = {"provenance": np.array(json.dumps(account)), **arrays}
+        origin = np.array(json.dumps(account(config, seed)))
+        contents: dict[str, Any] = {"provenance": origin, **arrays}
         np.savez_compressed(file, **contents)
+
+
+def account(config: object, seed: int) -> dict[str, object]:
+    """Where a file comes from: config, seed and versions, as JSON types."""
+    return {"config": plain(config), "seed": seed, "versions": versions()}
 
 
 def plain(value: object) -> object:
