@@ -1,6 +1,6 @@
 """The environments of mcmj.environment for Gymnasium; needs the extra "gym".
 
-    gymnasium.make("mcmj.gymnasium_env:mcmj/Orbit-v0", name="quadratic")
+gymnasium.make("mcmj.gymnasium_env:mcmj/Orbit-v0", name="quadratic")
 """
 
 from typing import Any
@@ -15,7 +15,7 @@ from mcmj.validation import Array
 ID = "mcmj/Orbit-v0"
 
 
-class OrbitEnv(gymnasium.Env[dict[str, Array], Array]):
+class OrbitEnv(gymnasium.Env[dict[str, Any], Array]):
     """A body that is to generate an orbit; see mcmj.environment.Orbit.
 
     Args:
@@ -39,7 +39,7 @@ class OrbitEnv(gymnasium.Env[dict[str, Array], Array]):
         self.render_mode = render_mode
         action = self.environment.action_spec()
         self.action_space = spaces.Box(action.minimum, action.maximum, action.shape, np.float64)
-        self.observation_space = spaces.Dict(
+        self.observation_space: spaces.Dict = spaces.Dict(
             {
                 key: spaces.Box(spec.minimum, spec.maximum, spec.shape, np.float64)
                 for key, spec in self.environment.observation_spec().items()
@@ -73,4 +73,4 @@ class OrbitEnv(gymnasium.Env[dict[str, Array], Array]):
 
 
 if ID not in gymnasium.registry:
-    gymnasium.register(ID, entry_point=OrbitEnv)
+    gymnasium.register(ID, entry_point=f"{__name__}:OrbitEnv")

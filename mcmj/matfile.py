@@ -26,8 +26,6 @@ from mcmj.errors import BodyFileError, InvalidArgumentError, UnknownNameError
 from mcmj.trajectory import State
 from mcmj.validation import Array
 
-_SPRINGS = ("k1", "k3", "d1", "d3")
-
 
 @dataclass(frozen=True)
 class ToolboxNet:
@@ -94,7 +92,7 @@ def _read(net: dict[str, Any]) -> ToolboxNet:
     body = Body(
         start[:, :2],
         np.column_stack([np.ravel(springs["from"]), np.ravel(springs["to"])]) - 1,
-        *(np.ravel(springs[name]) for name in _SPRINGS),
+        **{name: np.ravel(springs[name]) for name in ("k1", "k3", "d1", "d3")},
         rest_lengths=np.ravel(springs["l0"]),
         fixed=np.ravel(points["fixed"]).astype(bool),
         w_in=_matrix(net.get("W_in"), n_nodes),

@@ -67,7 +67,7 @@ def whole_file(path: str | Path) -> Iterator[Path]:
 
 @contextmanager
 def whole_folder(path: str | Path) -> Iterator[Path]:
-    """As `whole_file`, for a file format that is a folder.
+    """As `whole_file`, for a file format that is a folder: an empty one, to be filled.
 
     Raises:
         OutputError: the disk or the folder does not take it.
@@ -75,6 +75,7 @@ def whole_folder(path: str | Path) -> Iterator[Path]:
     final = Path(path)
     temporary = final.with_name(f".{os.getpid()}-{final.name}")
     try:
+        temporary.mkdir()
         yield temporary
         shutil.rmtree(final, ignore_errors=True)
         os.replace(temporary, final)
