@@ -79,6 +79,7 @@ class Physics(mujoco.Physics):
 
     body: Body
     w_out: Array
+    blew_up = False  # in this episode
 
     @classmethod
     def of_body(cls, body: Body, w_out: object, timestep: float, gate: float) -> "Physics":
@@ -89,6 +90,17 @@ class Physics(mujoco.Physics):
         physics.model.actuator_biasprm[body.n_inputs :, 0] = gate
         physics.body, physics.w_out = body, readout
         return physics
+
+    def step(self, n_sub_steps: int = 1) -> None:
+        """As dm_control's; a blow-up is remembered, with the last good state, not raised."""
+        before = self.get_state()
+        try:
+            super().step(n_sub_steps)
+        except control.PhysicsError:
+            self.blew_up = True
+            self.set_state(before)
+            with self.suppress_physics_errors():
+                self.forward()
 
     def lengths(self) -> Array:
         """Spring lengths (L,) now [m]."""
@@ -118,7 +130,7 @@ class Orbit(base.Task):
         target: Target,
         setting: Setting,
         first: tuple[Array, Array, float] | None = None,
-        random: int | np.random.RandomState | None = None,
+        random: int | np.random.RandomState = 0,
     ) -> None:
         super().__init__(random=random)
         self.target, self.setting = target, setting
@@ -137,7 +149,7 @@ class Orbit(base.Task):
 
     def reseed(self, seed: int) -> None:
         """Start the task's random numbers anew."""
-        self._random = np.random.RandomState(seed)
+        self.random.seed(seed)
 
     def initialize_episode(self, physics: Physics) -> None:
         """Rest or a point of the cycle, kicked."""
@@ -149,6 +161,7 @@ class Orbit(base.Task):
             physics.data.qpos[:] = (positions - physics.body.positions)[free].ravel()
             velocities += moving[free]
         physics.data.qvel[:] = velocities.ravel()
+        physics.blew_up = False
         self._window.clear()
         super().initialize_episode(physics)
 
@@ -183,11 +196,15 @@ class Orbit(base.Task):
         )
 
     def get_termination(self, physics: Physics) -> float | None:
-        """0 if the outputs have run away to their bounds."""
-        return 0.0 if np.abs(physics.outputs()).max() >= self._bounds["outputs"][1][0] else None
+        """0 if the body blew up, or its outputs have run away to their bounds."""
+        largest = np.abs(physics.outputs()).max()
+        gone = physics.blew_up or largest >= self._bounds["outputs"][1][0]
+        return 0.0 if gone else None
 
     def get_reward(self, physics: Physics) -> float:
         """1 up to the orbit error `good`, 0.1 a margin further, by a Gaussian."""
+        if physics.blew_up:
+            return 0.0
         setting = self.setting
         bounds = (0.0, setting.good)
         return float(rewards.tolerance(self._window.error, bounds=bounds, margin=setting.margin))
@@ -206,7 +223,7 @@ def make(
     w_out: object,
     target: Target,
     setting: Setting | None = None,
-    random: int | np.random.RandomState | None = None,
+    random: int | np.random.RandomState = 0,
 ) -> Environment:
     """An environment of a body with its readout.
 
@@ -234,7 +251,7 @@ def load(
     name: str,
     task: str | None = None,
     setting: Setting | None = None,
-    random: int | np.random.RandomState | None = None,
+    random: int | np.random.RandomState = 0,
 ) -> Environment:
     """The environment of a body by its name, or of a body file, in the manner of the suite.
 

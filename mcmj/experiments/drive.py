@@ -132,7 +132,7 @@ def run(config: Config, *, on_episodes: OnSteps = lambda episodes: None) -> Resu
 
     wanted = target(config.task)
     body = random_body(config.seed, config.nodes, n_inputs=1)
-    fit = teach(Simulation(body), wanted, Teaching(), config.seed)
+    fit = teach(Simulation(body, engine="twin"), wanted, Teaching(), config.seed)
     setting = Setting(
         actions="inputs", input_limit=config.input_limit, kick=0.0,
         control_timestep=config.control_timestep, time_limit=config.time_limit,
