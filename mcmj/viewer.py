@@ -6,11 +6,13 @@ there pulls the real body by a spring. Keys are digits that the viewer itself do
 
 import os
 import queue
-import sys
+import threading
+import warnings
 import xml.etree.ElementTree as ET
 from collections import deque
 from collections.abc import Callable
 
+import glfw  # comes with mujoco
 import mujoco
 import mujoco.viewer
 import numpy as np
@@ -25,6 +27,7 @@ from mcmj.mjcf import to_mjcf
 from mcmj.validation import Array
 
 FPS = 30
+CLOSING = 10.0  # seconds that the window may take to close
 VIEW_SHARE = 1.25  # of the window's height to the body's
 PLOTS_SHIFT, HELP_SHIFT = 0.25, 0.08  # the body stands left of the plots, above the help
 SHOWN = 12.0  # seconds of outputs in the plot
@@ -39,6 +42,20 @@ HELP = {
 
 class NoDisplayError(McmjError):
     """There is no screen to open a window on."""
+
+
+def _require_screen() -> None:
+    """MuJoCo's viewer would wait for ever for a window that cannot open."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # the reason is said below
+        opened = glfw.init()
+        glfw.terminate()
+    if not opened:
+        display = os.environ.get("DISPLAY")
+        raise NoDisplayError(
+            f"the viewer cannot open a window (DISPLAY is {display or 'not set'}); without a "
+            "screen, scripts/render.py makes films, or: apt-get install xvfb; xvfb-run -a .."
+        )
 
 
 def shown_model(body: Body) -> mujoco.MjModel:
@@ -65,13 +82,7 @@ class Viewer:
     """
 
     def __init__(self, loop: LiveLoop, scale: float, kick: Callable[[], None]) -> None:
-        if sys.platform == "linux" and not (
-            os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
-        ):
-            raise NoDisplayError(
-                "the viewer needs a screen, and DISPLAY is not set; without one, "
-                "scripts/render.py makes films, or: apt-get install xvfb; xvfb-run -a .."
-            )
+        _require_screen()
         self._loop, self._scale, self._kick = loop, scale, kick
         self._model = shown_model(loop.body)
         self._data = mujoco.MjData(self._model)
@@ -79,10 +90,12 @@ class Viewer:
         self._keys: queue.SimpleQueue[int] = queue.SimpleQueue()
         self._largest = 1e-12  # strain so far, for the colours
         self._plots = Plots(loop.body.n_outputs)
+        before = set(threading.enumerate())
         self._handle = mujoco.viewer.launch_passive(
             self._model, self._data, key_callback=self._keys.put,
             show_left_ui=False, show_right_ui=False,
         )  # fmt: skip
+        self._threads = set(threading.enumerate()) - before
         self._look_from_above()
 
     def __enter__(self) -> "Viewer":
@@ -90,6 +103,8 @@ class Viewer:
 
     def __exit__(self, *_: object) -> None:
         self._handle.close()
+        for thread in self._threads:  # one that still draws as Python ends would crash it
+            thread.join(CLOSING)
 
     @property
     def is_open(self) -> bool:

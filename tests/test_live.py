@@ -42,13 +42,14 @@ def test_it_is_the_closed_loop(loop, body, w_out, w_bias):
 
 
 def test_freezing_is_that_of_a_schedule(loop, body, w_out):
-    schedule = mcmj.Schedule([mcmj.Phase(0.3), mcmj.Phase(0.4, freeze=(1,)), mcmj.Phase(0.3)])
+    schedule = mcmj.Schedule([mcmj.Phase(0.4, freeze=(1,)), mcmj.Phase(0.3)])
     simulation = mcmj.Simulation(body, w_out=w_out)
+    simulation.rollout(300)
     wanted = mcmj.run_schedule(simulation, schedule, seed=0)
     loop.advance(300)
     loop.freeze(1)
     loop.advance(399)
-    assert np.abs(loop.outputs - wanted.feedback[699]).max() < 1e-12
+    assert np.abs(loop.outputs - wanted.feedback[399]).max() < 1e-12
     loop.advance(1)
     loop.freeze(1)
     loop.advance(300)
@@ -91,9 +92,9 @@ def test_what_does_not_fit_is_said(loop, body, monkeypatch):
         loop.freeze(2)
     with pytest.raises(InvalidArgumentError, match="press: expected key@second"):
         Config(press=("kick",))
-    monkeypatch.delenv("DISPLAY", raising=False)
+    monkeypatch.setenv("DISPLAY", ":99999")
     monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
-    with pytest.raises(NoDisplayError, match="DISPLAY is not set"):
+    with pytest.raises(NoDisplayError, match="cannot open a window"):
         run(Config(body="van_der_pol"))
 
 
