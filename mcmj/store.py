@@ -47,8 +47,11 @@ def prepare_folder(folder: str | Path) -> Path:
 
 
 @contextmanager
-def whole_file(path: str | Path) -> Iterator[Path]:
+def whole_file(path: str | Path, *, folder: bool = False) -> Iterator[Path]:
     """A temporary path beside `path` that takes its place if the block succeeds.
+
+    Args:
+        folder: for formats that are folders; the block gets an empty one to fill.
 
     Raises:
         OutputError: the disk or the folder does not take it.
@@ -56,33 +59,20 @@ def whole_file(path: str | Path) -> Iterator[Path]:
     final = Path(path)
     temporary = final.with_name(f".{os.getpid()}-{final.name}")
     try:
+        if folder:
+            temporary.mkdir()
         yield temporary
+        if folder:  # only an empty one can be replaced
+            shutil.rmtree(final, ignore_errors=True)
         os.replace(temporary, final)
     except OSError as error:
         raise OutputError(f"cannot write {final}: {error.strerror or error}") from error
     finally:
         with suppress(OSError):
-            temporary.unlink(missing_ok=True)
-
-
-@contextmanager
-def whole_folder(path: str | Path) -> Iterator[Path]:
-    """As `whole_file`, for a file format that is a folder: an empty one, to be filled.
-
-    Raises:
-        OutputError: the disk or the folder does not take it.
-    """
-    final = Path(path)
-    temporary = final.with_name(f".{os.getpid()}-{final.name}")
-    try:
-        temporary.mkdir()
-        yield temporary
-        shutil.rmtree(final, ignore_errors=True)
-        os.replace(temporary, final)
-    except OSError as error:
-        raise OutputError(f"cannot write {final}: {error.strerror or error}") from error
-    finally:
-        shutil.rmtree(temporary, ignore_errors=True)
+            if folder:
+                shutil.rmtree(temporary, ignore_errors=True)
+            else:
+                temporary.unlink(missing_ok=True)
 
 
 def write_text(path: str | Path, text: str) -> None:

@@ -13,7 +13,7 @@ import numpy as np
 import xarray
 
 from mcmj.errors import InvalidArgumentError, TrajectoryFileError
-from mcmj.store import whole_folder
+from mcmj.store import whole_file
 from mcmj.trajectory import RECORDABLE, Trajectory
 
 _AXES = {
@@ -72,7 +72,7 @@ def write_zarr(
     dataset.attrs["provenance"] = json.dumps(account)
     if body is not None:
         dataset.attrs["body"] = body
-    with whole_folder(path) as temporary:
+    with whole_file(path, folder=True) as temporary:
         dataset.to_zarr(temporary, mode="w", consolidated=False, zarr_format=3)
         for part in parts:
             to_dataset(part).to_zarr(temporary, append_dim="time", consolidated=False)

@@ -152,11 +152,11 @@ def test_mujoco_is_imported_in_few_places():
     assert {name for name in MODULES if "mujoco" in outside(name)} <= MUJOCO
 
 
-@pytest.mark.parametrize("package", ["xarray", "zarr", "gymnasium", "dm_control"])
+@pytest.mark.parametrize("package", ["xarray", "zarr", "h5py", "gymnasium", "dm_control"])
 def test_extras_are_imported_only_where_they_are_needed(package):
     """A plain installation can import everything that most users do."""
     users = {name for name in MODULES if package in outside(name)}
-    assert users <= {"zarr_file", "environment", "gymnasium_env"}
+    assert users <= {"zarr_file", "openprc_file", "environment", "gymnasium_env"}
     for name in ("simulation", "rendering", "experiments.limit_cycle", "library", "bodyfile"):
         assert not users & reachable(name)
 
