@@ -46,6 +46,9 @@ class GLView:
         self._data = mujoco.MjData(model)
         self._extent = max(frame(body)[2:])
         self._renderer = _renderer(model, width, height)
+        # the white sky is half the cost of a picture in software; smoothed edges need it
+        self._paint_white = samples == 0
+        self._renderer.scene.flags[mujoco.mjtRndFlag.mjRND_SKYBOX] = not self._paint_white
         self.backend = os.environ.get("MUJOCO_GL") or "window system"
 
     def __enter__(self) -> "GLView":
@@ -69,7 +72,11 @@ class GLView:
         self._renderer.update_scene(data, camera="top")
         for node in np.flatnonzero(np.abs(arrows) > 0.01 * self._extent):
             self._add_arrow(positions[node], float(arrows[node]))
-        return self._renderer.render()
+        picture = self._renderer.render()
+        if self._paint_white:
+            empty = (picture[..., 0] | picture[..., 1] | picture[..., 2]) == 0
+            picture += np.uint8(255) * empty[..., None]
+        return picture
 
     def _add_arrow(self, start: Array, length: float) -> None:
         scene, height = self._renderer.scene, 0.03 * self._extent  # above nodes and springs

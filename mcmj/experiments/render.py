@@ -34,8 +34,9 @@ class Config:
             of a run.
         readout: name of a readout in the body file; default: that of the task, else its active
             one; a body without any is taught the task.
-        task: target drawn in red, and what a body without readout is taught; default: the
-            readout's name if it is a target, else van_der_pol.
+        task: target drawn in red, on which the run starts, and what a body without readout is
+            taught; default: the readout's name if it is a target, else none (such a run starts
+            at rest), or van_der_pol for a body without readout.
         seed: of noise and random forces.
         duration: of the run, if nothing disturbs it [s].
         freeze: outputs (1, 2, ..) that are held at their value while the body is disturbed.
@@ -105,10 +106,10 @@ def run(config: Config, *, on_steps: OnSteps = lambda steps: None) -> Film:
         return _film_of_file(config, config.trajectory)
     body, w_out, wanted = _find(config)
     simulation = Simulation(body)
-    if w_out is None:
+    if w_out is None and wanted is not None:
         teach(simulation, wanted, Teaching(), config.seed, on_steps=on_steps)
         w_out = simulation.w_out
-    elif not config.from_rest:
+    elif wanted is not None and not config.from_rest:
         synchronise(simulation, wanted, Teaching().washout)
     simulation.set_readout(w_out)
     if config.from_rest:
@@ -131,24 +132,28 @@ def _film_of_file(config: Config, path: Path) -> Film:
     return _film(config, body, trajectory, outputs, np.zeros(body.n_nodes), wanted, ())
 
 
-def _find(config: Config) -> tuple[Body, Array | None, Target]:
-    """The body, its readout if it has one, and the target."""
+def _find(config: Config) -> tuple[Body, Array | None, Target | None]:
+    """The body, its readout if it has one, and the target: one of the two is there."""
     model = load_model(body_path(config.body))
     body, named = body_of_model(model), readouts_of_model(model)
     if config.readout is not None and config.readout not in named:
         raise UnknownNameError("readout", config.readout, named)
-    name = config.readout or config.task or next(iter(named), None)
-    w_out = named.get(name) if name else None
+    name = config.readout or config.task or next(iter(named), "")
+    w_out = named[name] if named and name in named else None
     if w_out is None and not named:
         w_out = readout_of_model(model)
-    task = config.task or (name if name in TARGETS else "van_der_pol")
-    wanted = target(task)
-    if body.n_outputs != wanted.n_outputs:
+    task = config.task or (name if name in TARGETS else None)
+    if task is None and w_out is None:
+        task = "van_der_pol"
+    wanted = None if task is None else target(task)
+    if wanted is not None and body.n_outputs != wanted.n_outputs:
         raise InvalidArgumentError("body", f"{wanted.n_outputs} outputs for {task}", body)
     return body, w_out, wanted
 
 
-def _film_of_run(config: Config, simulation: Simulation, wanted: Target, on_steps: OnSteps) -> Film:
+def _film_of_run(
+    config: Config, simulation: Simulation, wanted: Target | None, on_steps: OnSteps
+) -> Film:
     """Before, during and after the disturbance; or one undisturbed stretch."""
     body, draw = simulation.body, stream(config.seed, "forces")
     pushes = draw.uniform(-config.forces, config.forces, body.n_nodes)
