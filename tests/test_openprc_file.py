@@ -1,4 +1,4 @@
-"""simulation.h5 as OpenPRC's README documents it, read by its own loader where that is there."""
+"""simulation.h5 as OpenPRC's README documents it."""
 
 import numpy as np
 import pytest
@@ -30,19 +30,6 @@ def test_the_documented_schema(run, body, tmp_path):
     assert again.positions == pytest.approx(run.positions, rel=1e-7)
     assert again.velocities == pytest.approx(run.velocities, rel=1e-7)
     assert again.times == pytest.approx(run.times, rel=1e-7)
-
-
-def test_its_own_loader_reads_it(run, body, tmp_path):
-    loader = pytest.importorskip(
-        "openprc.reservoir.io.state_loader", reason="OpenPRC is not installed"
-    )
-    save_openprc(tmp_path / "simulation.h5", run, body)
-    state = loader.StateLoader(tmp_path / "simulation.h5")
-    assert state.dt == pytest.approx(1e-3)
-    positions = state.get_node_positions(dims=[0, 1], reshape_output=False)
-    assert positions == pytest.approx(run.positions, rel=1e-7)
-    strain = run.lengths / body.rest_lengths - 1.0
-    assert state.get_bar_strains() == pytest.approx(strain, rel=1e-6, abs=1e-12)
 
 
 def test_what_does_not_fit_is_said(run, body, tmp_path):
