@@ -9,7 +9,8 @@ import gymnasium
 import numpy as np
 from gymnasium import spaces
 
-from mcmj.environment import Environment, Setting, load
+from mcmj.environment import Environment, load
+from mcmj.environment_setting import Setting
 from mcmj.validation import Array
 
 ID = "mcmj/Orbit-v0"

@@ -13,6 +13,7 @@ import numpy as np
 
 from mcmj import metrics
 from mcmj.body import Body
+from mcmj.environment_setting import Setting
 from mcmj.errors import UnknownNameError
 from mcmj.generator import random_body
 from mcmj.progress import OnSteps
@@ -128,7 +129,7 @@ def run(config: Config, *, on_episodes: OnSteps = lambda episodes: None) -> Resu
     Raises:
         DivergenceError: the body blew up under the teacher.
     """
-    from mcmj.environment import Setting, make  # dm_control is an extra
+    from mcmj.environment import make  # dm_control is an extra
 
     wanted = target(config.task)
     body = random_body(config.seed, config.nodes, n_inputs=1)
