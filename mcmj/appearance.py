@@ -3,6 +3,7 @@
 import xml.etree.ElementTree as ET
 
 import numpy as np
+import numpy.typing as npt
 
 from mcmj.body import Body
 
@@ -11,7 +12,11 @@ INPUT_COLOUR = (0.20, 0.70, 0.20)
 FEEDBACK_COLOURS = ((0.55, 0.20, 0.70), (0.10, 0.70, 0.75), (0.95, 0.60, 0.10), (0.90, 0.40, 0.65))
 PLAIN_COLOUR = (0.45, 0.45, 0.45)
 SPRING_COLOUR = (0.55, 0.58, 0.62)
+STRETCHED_COLOUR = (0.84, 0.15, 0.16)
+SHORTENED_COLOUR = (0.12, 0.31, 0.84)
+ARROW_COLOUR = (0.10, 0.10, 0.10)
 CAMERA_ANGLE = 30.0  # degrees; narrow: nodes far out are seen from above too
+NODE_SHARE, SPRING_SHARE = 0.014, 0.003  # radii, of the view
 MARGIN = 0.12  # of the body's larger side, around it
 
 
@@ -25,6 +30,18 @@ def node_colour(body: Body, node: int) -> tuple[float, float, float]:
     return INPUT_COLOUR if body.w_in[node].any() else PLAIN_COLOUR
 
 
+def node_kinds(body: Body) -> dict[str, tuple[float, float, float]]:
+    """Names and colours of the roles that a body's nodes have, for a legend."""
+    kinds = {"fixed": FIXED_COLOUR}
+    if body.n_inputs:
+        kinds["input"] = INPUT_COLOUR
+    for c in range(body.n_outputs):
+        kinds[f"fed x{c + 1}"] = FEEDBACK_COLOURS[c % len(FEEDBACK_COLOURS)]
+    kinds["free"] = PLAIN_COLOUR
+    used = {node_colour(body, node) for node in range(body.n_nodes)}
+    return {name: colour for name, colour in kinds.items() if colour in used}
+
+
 def frame(body: Body) -> tuple[float, float, float, float]:
     """Centre x, centre y, width and height [m] of the view that shows the whole body."""
     low, high = body.positions.min(axis=0), body.positions.max(axis=0)
@@ -35,7 +52,7 @@ def frame(body: Body) -> tuple[float, float, float, float]:
 
 def node_style(body: Body, node: int) -> dict[str, str]:
     """Attributes of a node's site."""
-    radius = 0.014 * max(frame(body)[2:])
+    radius = NODE_SHARE * max(frame(body)[2:])
     shape = "box" if body.fixed[node] else "sphere"
     colour = " ".join(f"{c:g}" for c in node_colour(body, node))
     return {"type": shape, "size": f"{radius:.6g} {radius:.6g} {radius:.6g}", "rgba": f"{colour} 1"}
@@ -59,7 +76,7 @@ def add_appearance(root: ET.Element, body: Body) -> None:
     )  # fmt: skip
     default = ET.SubElement(root, "default")
     colour = " ".join(f"{c:g}" for c in SPRING_COLOUR)
-    ET.SubElement(default, "tendon", width=f"{0.003 * extent:.6g}", rgba=f"{colour} 1")
+    ET.SubElement(default, "tendon", width=f"{SPRING_SHARE * extent:.6g}", rgba=f"{colour} 1")
     world = ET.SubElement(root, "worldbody")
     ET.SubElement(
         world,
@@ -68,3 +85,10 @@ def add_appearance(root: ET.Element, body: Body) -> None:
         pos=f"{cx:.9g} {cy:.9g} {distance:.9g}",
         fovy=f"{CAMERA_ANGLE:g}",
     )
+
+
+def strain_colours(strain: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+    """Colours (..., L, 3) from strain (..., L) in [-1, 1]: blue if shortened, red if stretched."""
+    goal = np.where(strain[..., None] > 0, STRETCHED_COLOUR, SHORTENED_COLOUR)
+    weight = np.sqrt(np.abs(strain))[..., None]
+    return (1 - weight) * np.array(SPRING_COLOUR) + weight * goal

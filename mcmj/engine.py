@@ -1,6 +1,7 @@
 """Copies of one body in MuJoCo, stepped wholly in C on several threads.
 
-The only module that touches MuJoCo's state. Arrays have the copies as their first axis.
+The only module that touches MuJoCo's state in a rollout. Arrays have the copies as their first
+axis.
 """
 
 from collections.abc import Sequence

@@ -27,6 +27,10 @@ class BodyFileError(McmjError, ValueError):
     """A file or string that is not an mcmj body in MJCF."""
 
 
+class TrajectoryFileError(McmjError, ValueError):
+    """A file or folder that is not a trajectory of mcmj's."""
+
+
 class DivergenceError(McmjError, ArithmeticError):
     """A simulation blew up: says when, where, under which integrator, and what to try.
 

@@ -1,125 +1,192 @@
-"""Off-screen videos of a body at work: deformation scaled up, springs coloured by strain.
+"""Videos and pictures of a body at work: springs coloured by strain, deformation magnified.
 
-With no display, `MUJOCO_GL` must be set before mujoco is imported: mcmj/__init__.py does it.
+Pictures come from MuJoCo's off-screen renderer, or from matplotlib where there is no OpenGL,
+so that they never depend on a driver.
 """
 
-import os
-import sys
-from collections.abc import Iterator
+import time
+from collections.abc import Iterator, Mapping
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass, field
 from pathlib import Path
+from statistics import median
 
 import imageio_ffmpeg
 import mediapy
-import mujoco
 import numpy as np
 import numpy.typing as npt
-from PIL import Image, ImageDraw, ImageFont
+from PIL import Image
 
-from mcmj.appearance import SPRING_COLOUR, frame
-from mcmj.body import Body, spring_lengths
-from mcmj.bodyfile import load_model
-from mcmj.errors import McmjError
-from mcmj.mjcf import to_mjcf
+from mcmj.body import Body
+from mcmj.caption import Caption
+from mcmj.errors import InvalidArgumentError, UnknownNameError
+from mcmj.film import Film
+from mcmj.flatview import FlatView
+from mcmj.glview import GLView, RenderingUnavailableError
+from mcmj.panel import Panel
+from mcmj.progress import OnSteps
 from mcmj.store import whole_file
 from mcmj.targets import Target
-from mcmj.validation import Array
+from mcmj.validation import Array, require_count, require_number
 
-Frame = npt.NDArray[np.uint8]
+Picture = npt.NDArray[np.uint8]
 
-SIZE = 400  # pixels: a frame is two squares
-FPS = 25
-TRAIL = 3.0  # seconds of outputs drawn behind the dot
-STRETCHED, SHORTENED = np.array([0.84, 0.15, 0.16]), np.array([0.12, 0.31, 0.84])
-REMEDY = "on Debian or Ubuntu: apt-get install libegl1 libegl-mesa0 libgl1-mesa-dri libopengl0"
-SHOWN_SHARE = 0.05  # the automatic scale makes the largest displacement this share of the body
-
-
-class RenderingUnavailableError(McmjError):
-    """No OpenGL: videos cannot be made here; everything else can."""
+WIDTH, HEIGHT, PANEL_WIDTH = 640, 480, 384  # pixels of the body's picture; of the panel beside it
+RENDERERS = ("auto", "mujoco", "matplotlib")
+SUFFIXES = (".mp4", ".gif")
+GIF_SHARE = 2  # a GIF is so many times smaller and has so many times fewer frames
+ORBIT_POINTS = 1000  # of a target, as drawn
 
 
-def deformation_scale(body: Body, positions: Array) -> float:
-    """A round factor (1, 2, 5, 10, ..) that makes displacements (T, N, 2) visible."""
-    largest = np.abs(positions - body.positions).max()
-    if largest == 0.0:
-        return 1.0
-    wanted = SHOWN_SHARE * max(frame(body)[2:]) / largest
-    exponent = np.floor(np.log10(wanted))
-    mantissa = max(m for m in (1, 2, 5) if m <= wanted / 10**exponent + 1e-9)
-    return max(1.0, float(mantissa * 10**exponent))
+@dataclass
+class Report:
+    """How the pictures were made.
+
+    Attributes:
+        backend: egl, osmesa, window system, or matplotlib.
+        why_flat: why there is no OpenGL, if matplotlib had to do.
+        body_ms, frame_ms: of every picture of the body alone, and with panel and text [ms].
+    """
+
+    backend: str = ""
+    why_flat: str = ""
+    body_ms: list[float] = field(default_factory=list)
+    frame_ms: list[float] = field(default_factory=list)
+
+    @property
+    def metrics(self) -> dict[str, object]:
+        """Medians over the frames, as in metrics.json."""
+        return {
+            "renderer": self.backend,
+            "frames": len(self.frame_ms),
+            "body_frame_ms": median(self.body_ms) if self.body_ms else None,
+            "whole_frame_ms": median(self.frame_ms) if self.frame_ms else None,
+        }
 
 
-def body_frames(body: Body, positions: Array, *, scale: float, size: int = SIZE) -> Iterator[Frame]:
-    """Pictures (size, size, 3) of the body at positions (F, N, 2), displacements times scale.
+@dataclass(frozen=True)
+class Style:
+    """How a film is shown.
+
+    Attributes:
+        fps: frames a second.
+        speed: 1: real time; 2: twice as fast; 0.5: slowed down.
+        renderer: auto (MuJoCo's, or matplotlib without OpenGL), mujoco or matplotlib.
+        samples: of MuJoCo's multisampling; 0: none, the fastest.
+    """
+
+    fps: float = 25.0
+    speed: float = 1.0
+    renderer: str = "auto"
+    samples: int = 0
+
+    def __post_init__(self) -> None:
+        require_number("fps", self.fps, 0.0, open_low=True)
+        require_number("speed", self.speed, 0.0, open_low=True)
+        require_count("samples", self.samples, 0)
+        if self.renderer not in RENDERERS:
+            raise UnknownNameError("renderer", self.renderer, RENDERERS)
+
+    @property
+    def pace(self) -> str:
+        """The speed in words."""
+        if self.speed == 1.0:
+            return "real time"
+        if self.speed > 1.0:
+            return f"{self.speed:g} x faster"
+        return f"slowed {1 / self.speed:g} x"
+
+
+@contextmanager
+def body_view(
+    body: Body, style: Style | None = None, *, width: int = WIDTH, height: int = HEIGHT,
+    report: Report | None = None,
+) -> Iterator[GLView | FlatView]:  # fmt: skip
+    """Something with `draw(positions, strains, arrows)`, see GLView.
 
     Raises:
-        RenderingUnavailableError: no OpenGL context can be made.
+        RenderingUnavailableError: MuJoCo's renderer was asked for, and there is no OpenGL.
     """
-    model = load_model(to_mjcf(body))
-    data = mujoco.MjData(model)
-    extension = spring_lengths(positions, body.springs) - body.rest_lengths
-    strain = extension / np.abs(extension).max() if extension.any() else extension
-    with _renderer(model, size) as renderer:
-        for moved, colour in zip(positions, strain, strict=True):
-            shift = scale * (moved - body.positions)
-            data.qpos[:] = shift[body.free].ravel()
-            model.tendon_rgba[: body.n_springs, :3] = _strain_colours(colour)
-            mujoco.mj_forward(model, data)
-            renderer.update_scene(data, camera="top")
-            yield renderer.render().copy()
+    style, report = style or Style(), report or Report()
+    view: GLView | FlatView
+    if style.renderer == "matplotlib":
+        view = FlatView(body, width, height)
+    else:
+        try:
+            view = GLView(body, width, height, samples=style.samples)
+        except RenderingUnavailableError as error:
+            if style.renderer == "mujoco":
+                raise
+            report.why_flat = str(error)
+            view = FlatView(body, width, height)
+    report.backend = view.backend
+    with view:
+        yield view
 
 
-def _strain_colours(strain: Array) -> Array:
-    """Colours (L, 3) from strain in [-1, 1]: blue when shortened, red when stretched."""
-    goal = np.where(strain[:, None] > 0, STRETCHED, SHORTENED)
-    weight = np.sqrt(np.abs(strain))[:, None]
-    return (1 - weight) * np.array(SPRING_COLOUR) + weight * goal
+def film_frames(
+    film: Film, style: Style | None = None, *, report: Report | None = None
+) -> Iterator[Picture]:
+    """Frames (480, 1024, 3) of a film: the body at work, beside its outputs."""
+    style, report = style or Style(), report or Report()
+    panel = Panel(film.times, film.outputs, film.orbit, film.windows, PANEL_WIDTH, HEIGHT)
+    caption = Caption(film, style.pace, (WIDTH, HEIGHT))
+    with body_view(film.body, style, report=report) as view:
+        for index in film.pick(style.fps, style.speed):
+            start = time.perf_counter()
+            picture = view.draw(
+                film.drawn_positions(index), film.relative_strains(index), film.arrows(index)
+            )
+            drawn = time.perf_counter()
+            whole = np.hstack([caption.write(picture, index), panel.draw(int(index))])
+            report.body_ms.append(1e3 * (drawn - start))
+            report.frame_ms.append(1e3 * (time.perf_counter() - start))
+            yield whole
 
 
-def _renderer(model: mujoco.MjModel, size: int) -> mujoco.Renderer:
-    chosen = os.environ.get("MUJOCO_GL") or os.environ.get("DISPLAY")
-    if sys.platform == "linux" and not chosen:
-        raise RenderingUnavailableError(f"no display, no EGL and no OSMesa library; {REMEDY}")
-    try:
-        model.vis.global_.offwidth = model.vis.global_.offheight = size
-        return mujoco.Renderer(model, size, size)
-    except Exception as error:  # each OpenGL backend raises errors of its own
-        raise RenderingUnavailableError(
-            f"no off-screen OpenGL ({type(error).__name__}: {error}); {REMEDY}"
-        ) from error
+def write_film(
+    film: Film, paths: Mapping[str, Path], style: Style | None = None, *, stills: int = 0,
+    on_frames: OnSteps = lambda frames: None,
+) -> Report:  # fmt: skip
+    """Write a film, each file whole or not at all.
+
+    Args:
+        paths: by suffix, any of ".mp4", ".gif" (smaller and with fewer frames) and ".png": the
+            stem of numbered stills.
+        stills: number of stills, equally spaced in time, the last frame among them.
+        on_frames: called with 1 after every frame, for progress bars.
+
+    Raises:
+        OutputError: a file cannot be written.
+        RenderingUnavailableError: MuJoCo's renderer was asked for, and there is no OpenGL.
+    """
+    style, report = style or Style(), Report()
+    count = len(film.pick(style.fps, style.speed))
+    if count < 2:
+        raise InvalidArgumentError("film", "long enough for two frames", f"{film.times[-1]:g} s")
+    kept = set(np.linspace(0, count - 1, stills + 1).round().astype(int)[1:].tolist())
+    with ExitStack() as stack:
+        mp4 = stack.enter_context(_video(paths[".mp4"], style.fps, 1)) if ".mp4" in paths else None
+        gif = (
+            stack.enter_context(_video(paths[".gif"], style.fps / GIF_SHARE, GIF_SHARE))
+            if ".gif" in paths
+            else None
+        )
+        for number, picture in enumerate(film_frames(film, style, report=report)):
+            if mp4 is not None:
+                mp4.add_image(picture)
+            if gif is not None and number % GIF_SHARE == 0:
+                gif.add_image(np.asarray(Image.fromarray(picture).reduce(GIF_SHARE)))
+            if number in kept and ".png" in paths:
+                write_picture(_numbered(paths[".png"], number), picture)
+            on_frames(1)
+    return report
 
 
-class PhasePortrait:
-    """A square picture of the target orbit on which the outputs draw themselves."""
-
-    def __init__(self, target: Target, outputs: Array, *, size: int = SIZE) -> None:
-        orbit = target.orbit(1000)
-        both = np.vstack([orbit[:, :2], outputs[:, :2]])
-        self._size = size
-        self._centre = (both.max(axis=0) + both.min(axis=0)) / 2
-        self._scale = 0.8 * size / np.ptp(both, axis=0).max()
-        self._font = ImageFont.load_default(size=16)
-        self._background = Image.new("RGB", (size, size), "white")
-        draw = ImageDraw.Draw(self._background)
-        draw.line(self._pixels(np.vstack([orbit, orbit[:1]])), fill=(236, 160, 160), width=7)
-        draw.text((14, 10), "target", fill=(200, 60, 60), font=self._font)
-        draw.text((74, 10), "outputs x2 over x1", fill="black", font=self._font)
-
-    def _pixels(self, values: Array) -> list[tuple[float, float]]:
-        flat = (values[:, :2] - self._centre) * self._scale * np.array([1, -1]) + self._size / 2
-        return [(float(x), float(y)) for x, y in flat]
-
-    def draw(self, trail: Array, caption: str) -> Frame:
-        """The portrait with a trail of outputs (n, >= 2), the newest last."""
-        picture = self._background.copy()
-        draw = ImageDraw.Draw(picture)
-        pixels = self._pixels(trail)
-        if len(pixels) > 1:
-            draw.line(pixels, fill="black", width=2)
-        x, y = pixels[-1]
-        draw.ellipse((x - 6, y - 6, x + 6, y + 6), fill="black")
-        draw.text((14, self._size - 30), caption, fill="black", font=self._font)
-        return np.asarray(picture)
+def write_picture(path: Path, picture: Picture) -> None:
+    """Write one PNG, whole or not at all."""
+    with whole_file(path) as temporary:
+        Image.fromarray(picture).save(temporary, format="png")
 
 
 def limit_cycle_video(
@@ -139,32 +206,30 @@ def limit_cycle_video(
         seconds: length of the video, from the first sample on.
 
     Raises:
-        RenderingUnavailableError: no OpenGL.
         OutputError: the file cannot be written.
     """
-    step = times[1] - times[0]
-    stride = 1.0 / (FPS * step)
-    shown = np.arange(min(int(seconds * FPS), int(len(times) / stride)))
-    at = np.minimum((shown * stride).round().astype(int), len(times) - 1)
-    scale = deformation_scale(body, positions)
-    portrait = PhasePortrait(target, outputs)
-    trail = round(TRAIL / step)
+    rows = slice(round(seconds / (times[1] - times[0])) + 1)
+    film = Film(
+        body, times[rows], positions[rows], outputs[rows],
+        forces=outputs[rows] @ body.w_fb.T, orbit=target.orbit(ORBIT_POINTS),
+    )  # fmt: skip
+    write_film(film, {".mp4": Path(path)})
+
+
+@contextmanager
+def _video(path: Path, fps: float, share: int) -> Iterator[mediapy.VideoWriter]:
+    """An open video file, MP4 or GIF by its suffix, of frames `share` times smaller."""
+    if path.suffix not in SUFFIXES:
+        raise InvalidArgumentError("path", f"a name that ends with {' or '.join(SUFFIXES)}", path)
     mediapy.set_ffmpeg(imageio_ffmpeg.get_ffmpeg_exe())
-    pictures = body_frames(body, positions[at], scale=scale)
-    first = next(pictures)
-    caption = f"real time, deformation x {scale:g}"
+    shape = (HEIGHT // share, (WIDTH + PANEL_WIDTH) // share)
+    options = {"codec": "gif"} if path.suffix == ".gif" else {"crf": 23}
     with (
-        whole_file(Path(path)) as temporary,
-        mediapy.VideoWriter(
-            temporary.with_suffix(".mp4"), (SIZE, 2 * SIZE), fps=FPS, crf=23
-        ) as video,
+        whole_file(path) as temporary,
+        mediapy.VideoWriter(temporary, shape, fps=fps, **options) as video,
     ):
-        for index, picture in zip(at, _chain(first, pictures), strict=True):
-            past = outputs[max(0, index - trail) : index + 1 : 10]
-            label = f"t = {times[index]:.1f} s   {caption}"
-            video.add_image(np.hstack([picture, portrait.draw(past, label)]))
+        yield video
 
 
-def _chain(first: Frame, rest: Iterator[Frame]) -> Iterator[Frame]:
-    yield first
-    yield from rest
+def _numbered(stem: Path, number: int) -> Path:
+    return stem.with_name(f"{stem.stem}_{number:04d}.png")

@@ -4,6 +4,7 @@ import dataclasses
 import json
 import os
 import platform
+import shutil
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from importlib.metadata import PackageNotFoundError, version
@@ -46,8 +47,11 @@ def prepare_folder(folder: str | Path) -> Path:
 
 
 @contextmanager
-def whole_file(path: str | Path) -> Iterator[Path]:
+def whole_file(path: str | Path, *, folder: bool = False) -> Iterator[Path]:
     """A temporary path beside `path` that takes its place if the block succeeds.
+
+    Args:
+        folder: for formats that are folders; the block gets an empty one to fill.
 
     Raises:
         OutputError: the disk or the folder does not take it.
@@ -55,13 +59,20 @@ def whole_file(path: str | Path) -> Iterator[Path]:
     final = Path(path)
     temporary = final.with_name(f".{os.getpid()}-{final.name}")
     try:
+        if folder:
+            temporary.mkdir()
         yield temporary
+        if folder:  # only an empty one can be replaced
+            shutil.rmtree(final, ignore_errors=True)
         os.replace(temporary, final)
     except OSError as error:
         raise OutputError(f"cannot write {final}: {error.strerror or error}") from error
     finally:
         with suppress(OSError):
-            temporary.unlink(missing_ok=True)
+            if folder:
+                shutil.rmtree(temporary, ignore_errors=True)
+            else:
+                temporary.unlink(missing_ok=True)
 
 
 def write_text(path: str | Path, text: str) -> None:
@@ -91,10 +102,15 @@ def write_arrays(
     for name, array in arrays.items():
         if np.asarray(array).dtype.hasobject:
             raise InvalidArgumentError(f"arrays[{name!r}]", "numbers, not Python objects", array)
-    account = {"config": plain(config), "seed": seed, "versions": versions()}
     with whole_file(path) as temporary, temporary.open("wb") as file:
-        contents: dict[str, Any] = {"provenance": np.array(json.dumps(account)), **arrays}
+        origin = np.array(json.dumps(account(config, seed)))
+        contents: dict[str, Any] = {"provenance": origin, **arrays}
         np.savez_compressed(file, **contents)
+
+
+def account(config: object, seed: int) -> dict[str, object]:
+    """Where a file comes from: config, seed and versions, as JSON types."""
+    return {"config": plain(config), "seed": seed, "versions": versions()}
 
 
 def plain(value: object) -> object:

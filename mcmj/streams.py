@@ -22,6 +22,7 @@ PURPOSES = (
     "schedule_forces",
     "schedule_noise",
     "rest_noise",
+    "input_search",
 )
 
 

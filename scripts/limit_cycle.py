@@ -16,7 +16,7 @@ from mcmj.experiments.limit_cycle import Result, checkpoints, run
 from mcmj.experiments.limit_cycle_config import Config, total_steps
 from mcmj.mjcf import to_mjcf
 from mcmj.progress import progress_bar
-from mcmj.rendering import RenderingUnavailableError, limit_cycle_video
+from mcmj.rendering import limit_cycle_video
 
 
 def work(config: Config, output: Output, out: Path) -> None:
@@ -65,22 +65,19 @@ def write(result: Result, out: Path) -> None:
 
 
 def write_videos(result: Result, out: Path) -> None:
-    """One MP4 a task, of the free run's last part; says in one line if there is no OpenGL."""
-    try:
-        for name, task in result.tasks.items():
-            if task.positions is None:
-                continue  # the twin records none
-            last = len(task.positions)
-            limit_cycle_video(
-                out / f"{name}.mp4",
-                result.body,
-                task.target,
-                task.times[-last:],
-                task.positions,
-                task.outputs[-last:],
-            )
-    except RenderingUnavailableError as error:
-        print(f"limit_cycle: no video: {error}", file=sys.stderr)
+    """One MP4 a task, of the free run's last part."""
+    for name, task in result.tasks.items():
+        if task.positions is None:
+            continue  # the twin records none
+        last = len(task.positions)
+        limit_cycle_video(
+            out / f"{name}.mp4",
+            result.body,
+            task.target,
+            task.times[-last:],
+            task.positions,
+            task.outputs[-last:],
+        )
 
 
 def show(result: Result, out: Path) -> None:

@@ -55,12 +55,14 @@ MUJOCO = {
     "experiments.full_scene",
     "experiments.limit_cycle_config",  # reads the model of a body file
     "experiments.loop_cost",  # times bare mj_step
+    "glview",
     "laws",
     "leapfrog",
+    "live",
     "quiet",
-    "rendering",
     "simulation",
     "structs",
+    "viewer",
 }
 
 
@@ -148,6 +150,21 @@ def test_library_does_not_know_its_experiments_or_command_lines():
 
 def test_mujoco_is_imported_in_few_places():
     assert {name for name in MODULES if "mujoco" in outside(name)} <= MUJOCO
+
+
+@pytest.mark.parametrize("package", ["xarray", "zarr", "h5py", "gymnasium", "dm_control"])
+def test_extras_are_imported_only_where_they_are_needed(package):
+    """A plain installation can import everything that most users do."""
+    users = {name for name in MODULES if package in outside(name)}
+    assert users <= {"zarr_file", "openprc_file", "environment", "gymnasium_env"}
+    for name in ("simulation", "rendering", "experiments.limit_cycle", "library", "bodyfile"):
+        assert not users & reachable(name)
+
+
+def test_pictures_take_films_and_never_simulate():
+    forbidden = {"simulation", "ensemble", "engine", "teaching"}
+    for name in ("film", "panel", "caption", "flatview", "glview", "rendering", "driveplot"):
+        assert not reachable(name) & forbidden, name
 
 
 def test_dm_control_is_imported_in_at_most_one_module():
