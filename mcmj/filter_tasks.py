@@ -46,11 +46,9 @@ def smooth_noise(
     rng: np.random.Generator, steps: int, timestep: float, time: float = 0.05
 ) -> Array:
     """White noise through two first-order low-passes of that time [s]: (T, 1), of variance 1."""
-    keep = np.exp(-timestep / time)
-    white = rng.standard_normal(steps + round(20 * time / timestep))
-    once = lfilter([1 - keep], [1, -keep], white)
-    twice = lfilter([1 - keep], [1, -keep], once)[-steps:]
-    return (twice / twice.std())[:, None]
+    white = rng.standard_normal((steps + round(20 * time / timestep), 1))
+    smooth = low_pass(low_pass(white, timestep, time), timestep, time)[-steps:]
+    return smooth / smooth.std()
 
 
 def gaussian_kernel(timestep: float, mu: float = 0.1, sigma: float = 0.05) -> Array:
@@ -71,7 +69,7 @@ def volterra(steps: int, timestep: float = 1e-3) -> FilterTask:
     """
     wave = sines(steps, timestep)
     past = np.convolve(wave, gaussian_kernel(timestep))[:steps]
-    return FilterTask("volterra", 0.2 * wave[:, None], _standard(past**2), tap_spacing=4)
+    return FilterTask("volterra", 0.2 * wave[:, None], _standard(past**2), tap_spacing=7)
 
 
 def toolbox_narma(steps: int, timestep: float = 1e-3) -> FilterTask:
@@ -102,12 +100,11 @@ def narma10(rng: np.random.Generator, symbols: int) -> FilterTask:
     return FilterTask("narma10", 4 * u[:, None] - 1, _narma(u, lag=0)[:, None])
 
 
-def delayed_recall(rng: np.random.Generator, symbols: int, delay: int) -> FilterTask:
-    """u_(k-delay), u uniform in [-1, 1]; 0 before the first symbol."""
+def delayed_recall(inputs: Array, delay: int) -> FilterTask:
+    """u_(k-delay) of inputs (M, n_inputs); 0 before the first symbol."""
     require_count("delay", delay, 0)
-    u = rng.uniform(-1.0, 1.0, (symbols, 1))
-    wanted = np.vstack([np.zeros((delay, 1)), u])[:symbols]
-    return FilterTask("delayed_recall", u, wanted)
+    wanted = np.vstack([np.zeros((delay, inputs.shape[1])), inputs])[: len(inputs)]
+    return FilterTask("delayed_recall", inputs, wanted)
 
 
 def switch(
@@ -121,7 +118,7 @@ def switch(
     """Analog state switching: the target is the sign of the last pulse, however long ago.
 
     One input is 0 but for pulses of +1 or -1, `pulse` seconds long, after pauses that are
-    uniform in `gaps` [s]. The target, +1 or -1, changes as the pulse begins.
+    uniform in `gaps` [s]. The target goes to +1 or -1 through a low-pass of half a pulse.
     """
     require_number("pulse", pulse, 0.0, open_low=True)
     u, y = np.zeros((steps, 1)), np.empty((steps, 1))
@@ -130,7 +127,13 @@ def switch(
         u[first : first + width], y[first:] = sign, sign
         first += width + round(rng.uniform(*gaps) / timestep)
         sign = rng.choice([-1.0, 1.0])
-    return FilterTask("switch", u, y)
+    return FilterTask("switch", u, low_pass(y, timestep, pulse / 2))
+
+
+def low_pass(values: Array, timestep: float, time: float) -> Array:
+    """z' = (values - z) / time, from 0, for values (T, n)."""
+    keep = np.exp(-timestep / time)
+    return lfilter([1 - keep], [1, -keep], values, axis=0)
 
 
 def delays(inputs: Array, taps: int, spacing: int = 1) -> Array:
