@@ -51,13 +51,23 @@ class Capacities:
 
     def of_degree(self, degree: int) -> float:
         """Sum of the capacities of one total degree; 1 is linear memory."""
-        degrees = np.array([sum(d for _, d in term) for term in self.terms])
-        return float(self.values[degrees == degree].sum())
+        return float(self.by_delay(degree).sum())
 
-    def of_delay(self, delay: int) -> float:
-        """Sum of the capacities whose oldest input is so many steps old."""
-        oldest = np.array([max(k for k, _ in term) for term in self.terms])
-        return float(self.values[oldest == delay].sum())
+    def by_delay(self, degree: int) -> Array:
+        """Capacities of one total degree, summed by the delay of the oldest input, 0, 1, ..."""
+        chosen = [i for i, term in enumerate(self.terms) if sum(d for _, d in term) == degree]
+        oldest = [max(delay for delay, _ in self.terms[i]) for i in chosen]
+        return np.bincount(oldest, self.values[chosen])
+
+    def of(self, term: Term) -> float:
+        """The capacity for one target, such as ((3, 1),) for u_(k-3).
+
+        Raises:
+            InvalidArgumentError: it was not among the targets.
+        """
+        if term not in self.terms:
+            raise InvalidArgumentError("term", "one of the targets", term)
+        return float(self.values[self.terms.index(term)])
 
 
 def memory_capacity(
@@ -65,8 +75,8 @@ def memory_capacity(
 ) -> Capacities:
     """Linear memory: the capacities for u_(k-i), i = 0 .. max_delay.
 
-        MC = sum_i cov(u_(k-i), y_k)^2 / (var u var y)   (Jaeger, GMD report 152, 2002, sums
-                                                          from i = 1; `of_delay(0)` is the rest)
+        MC = sum_i cov(u_(k-i), y_k)^2 / (var u var y)   (Jaeger, GMD report 152, 2002, leaves
+                                                          out i = 0: `total - of(((0, 1),))`)
 
     Args:
         states: (K, N).

@@ -46,7 +46,7 @@ class SwitchConfig:
     exam: float = 200.0
     noise: float = 0.4
     noise_time: float = 1.0
-    ridge_per_row: float = 1e-6
+    ridge_per_row: float = 1e-4
     switch_nodes: int = 25
 
     def __post_init__(self) -> None:
