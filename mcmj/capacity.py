@@ -57,7 +57,7 @@ class Capacities:
         """Capacities of one total degree, summed by the delay of the oldest input, 0, 1, ..."""
         chosen = [i for i, term in enumerate(self.terms) if sum(d for _, d in term) == degree]
         oldest = [max(delay for delay, _ in self.terms[i]) for i in chosen]
-        return np.bincount(oldest, self.values[chosen])
+        return np.bincount(oldest, self.values[chosen]).astype(np.float64)
 
     def of(self, term: Term) -> float:
         """The capacity for one target, such as ((3, 1),) for u_(k-3).

@@ -19,7 +19,7 @@ NAMES = {
 
 
 def capacity_figure(
-    by_delay: Mapping[int, Sequence[float]],
+    by_delay: Mapping[int, Array],
     maps: Mapping[str, tuple[str, Sequence[float], str, Sequence[float], Mapping[str, Array]]],
 ) -> Figure:
     """A row of measures for each map; above, the body's capacities over the delay.
@@ -41,11 +41,11 @@ def capacity_figure(
     return figure
 
 
-def _draw_delays(axes: Axes, by_delay: Mapping[int, Sequence[float]]) -> None:
+def _draw_delays(axes: Axes, by_delay: Mapping[int, Array]) -> None:
     longest = max(len(values) for values in by_delay.values())
     below = np.zeros(longest)
     for (degree, values), colour in zip(by_delay.items(), TASK_COLOURS, strict=False):
-        padded = np.pad(np.asarray(values), (0, longest - len(values)))
+        padded = np.pad(values, (0, longest - len(values)))
         label = f"degree {degree}: {padded.sum():.1f}"
         axes.bar(range(longest), padded, bottom=below, color=colour, width=0.8, label=label)
         below += padded

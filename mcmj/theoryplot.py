@@ -1,5 +1,6 @@
 """Figures of scripts/emulate.py and scripts/linearise.py. Takes results, never simulates."""
 
+import itertools
 from collections.abc import Mapping, Sequence
 from typing import Protocol
 
@@ -103,31 +104,34 @@ def diversity_figure(
     diversities: Sequence[float],
     conditions: Mapping[int, Sequence[float]],
     ranks: Mapping[int, Sequence[int]],
-    errors: Mapping[str, Sequence[float]],
-    equal: Mapping[str, float],
+    errors: Mapping[int, Sequence[float]],
+    equal: Mapping[int, float],
 ) -> Figure:
     """Conditioning and rank of R, and errors of the filter, as the diversity goes to 0.
 
     Args:
         diversities: positive ones, descending or ascending.
         conditions, ranks: [masses] at each of them, the ranks over 2 n.
-        errors: [label] nrmse_std of the filter at each of them.
-        equal: [label] the same without diversity.
+        errors: [masses] nrmse_std of the filter at each of them.
+        equal: [masses] the same without diversity.
     """
     figure = new_figure(13.5, 4.0)
     left, middle, right = figure.subplots(1, 3)
-    colours = [*TASK_COLOURS, "#9467bd", "#8c6d31"]
-    for (n, values), colour in zip(conditions.items(), colours, strict=False):
+    palette = [*TASK_COLOURS, "#9467bd", "#8c6d31", "#e377c2", "0.5"]
+    colours = dict(zip(sorted({*conditions, *errors}), itertools.cycle(palette)))  # noqa: B905
+    for n, values in conditions.items():
+        colour = colours[n]
         left.loglog(diversities, values, "o-", color=colour, ms=4, label=f"{n} springs")
-        middle.semilogx(diversities, np.divide(ranks[n], 2 * n), "o-", color=colour, ms=4)
+        middle.semilogx(diversities, np.divide(ranks[n], 2 * n), "o-", color=colour, ms=4,
+                        label=f"{n} springs")  # fmt: skip
     left.axhline(1 / np.finfo(float).eps, color="0.6", ls="--", lw=1)
     left.annotate("1 / rounding error", (min(diversities), 2e15), color="0.4", fontsize=8,
                   va="top")  # fmt: skip
     left.set(ylabel="condition number of R", ylim=(1, 1e22))
-    left.legend(frameon=False, loc="upper right")
     middle.set(ylabel="numerical rank of R / 2n", ylim=(0, 1.08))
-    for (label, values), colour in zip(errors.items(), colours, strict=False):
-        right.loglog(diversities, values, "o-", color=colour, ms=4, label=label)
+    middle.legend(frameon=False, loc="lower right")
+    for n, values in errors.items():
+        right.loglog(diversities, values, "o-", color=colours[n], ms=4, label=f"{n} springs")
     right.axhline(max(equal.values()), color=TARGET_COLOUR, ls="--", lw=1, label="equal springs")
     right.set(ylabel="NRMSE (std) on held-out data")
     right.legend(frameon=False, loc="lower left")

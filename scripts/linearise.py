@@ -17,8 +17,8 @@ def work(config: Config, output: Output, out: Path) -> None:
     with progress_bar("arrays", total_arrays(config), quiet=output.quiet) as on_arrays:
         result = run(config, on_arrays=on_arrays)
     store.write_text(out / "linearisability.txt", report(result))
-    errors = {f"{n} springs": e[:-1] for n, e in result.errors.items()}
-    equal = {f"{n} springs": e[-1] for n, e in result.errors.items()}
+    errors = {n: e[:-1] for n, e in result.errors.items()}
+    equal = {n: e[-1] for n, e in result.errors.items()}
     figure = diversity_figure(
         config.diversities,
         {n: c[:-1] for n, c in result.conditions.items()},

@@ -8,6 +8,7 @@ over size and input strength, by the compiled twin (same bits but for rounding, 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from itertools import product
+from typing import Any
 
 import numpy as np
 
@@ -182,7 +183,11 @@ def measure(config: Config, body: Body, strength: float, symbols: int, *, engine
         DivergenceError: the body blew up.
     """
     u = stream(config.seed, "probe_inputs").uniform(-1.0, 1.0, (config.washout + symbols, 1))
-    options = {"timestep": TIMESTEP, "integrator": config.integrator, "engine": engine}
+    options: dict[str, Any] = {
+        "timestep": TIMESTEP,
+        "integrator": config.integrator,
+        "engine": engine,
+    }
     sim = Simulation(body, **options)
     states = held_states(sim, strength * u, config.hold_steps)[config.washout :]
     capacities = processing_capacity(states, u[config.washout :, 0], config.max_delays)
@@ -207,7 +212,7 @@ def _scaled(config: Config) -> tuple[tuple[int, int], list[tuple[BodySettings, f
     s = config.settings
     cells = []
     for stiff, damp in product(config.stiffness, config.damping):
-        ranges = {
+        ranges: dict[str, Any] = {
             name: tuple(factor * bound for bound in getattr(s, name))
             for name, factor in (("k1", stiff), ("k3", stiff), ("d1", damp), ("d3", damp))
         }
