@@ -118,7 +118,7 @@ def diversity_figure(
     figure = new_figure(13.5, 4.0)
     left, middle, right = figure.subplots(1, 3)
     palette = [*TASK_COLOURS, "#9467bd", "#8c6d31", "#e377c2", "0.5"]
-    colours = dict(zip(sorted({*conditions, *errors}), itertools.cycle(palette)))  # noqa: B905
+    colours = dict(zip(sorted({*conditions, *errors}), itertools.cycle(palette)))
     for n, values in conditions.items():
         colour = colours[n]
         left.loglog(diversities, values, "o-", color=colour, ms=4, label=f"{n} springs")

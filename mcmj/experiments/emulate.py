@@ -40,7 +40,7 @@ class Config:
 
     Attributes:
         targets: names of emulated_systems.SYSTEMS.
-        g: a G(x1, x2) of your own as text, such as "-x1 + (1 - x1**2) * x2"; target "user".
+        g: a G(x1, x2) of your own as text, as in --g="-x1 + (1 - x1**2) * x2"; target "user".
         integrators: mcmj's names.
         steps_ms: integration steps [ms], divisors of the horizon, 1 among them.
         horizon: length of the runs [s].
