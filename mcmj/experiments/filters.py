@@ -46,7 +46,7 @@ class Config:
         train, washout, test: lengths of the parts of the tasks at 1 ms [s].
         symbols, washout_symbols, test_symbols: lengths of the parts of the tasks in symbols.
         hold: how long a symbol is shown [s]: so long that the body can follow it, so short that
-            it remembers ten of them. Its modes are at 0.2 to 5 Hz.
+            it remembers ten of them. Its undamped modes (seed 0) are at 0.2 to 6 Hz.
         gain: force per unit input, on top of the input weights: large ones use the springs'
             nonlinearity, small ones their memory.
         volterra_gain: the same for the Volterra task, whose input is a fifth as large.
