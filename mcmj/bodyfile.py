@@ -9,7 +9,7 @@ import numpy as np
 
 from mcmj.body import Body
 from mcmj.errors import BodyFileError, InvalidArgumentError
-from mcmj.memory import TAG
+from mcmj.memory import COUPLED_TAG, TAG
 from mcmj.mjcf import READOUT_PREFIX
 from mcmj.validation import Array
 
@@ -148,7 +148,7 @@ def _spring_ends(model: mujoco.MjModel, springs: np.ndarray, nodes: np.ndarray) 
 
 
 def _spring_parameters(model: mujoco.MjModel, springs: np.ndarray) -> dict[str, Array]:
-    if model.nuser_tendon and (model.tendon_user[springs, 0] == TAG).all():
+    if model.nuser_tendon and np.isin(model.tendon_user[springs, 0], (TAG, COUPLED_TAG)).all():
         columns = model.tendon_user[springs, 2:7].T
         return dict(zip(("rest_lengths", "k1", "k3", "d1", "d3"), columns, strict=True))
     if model.tendon_stiffnesspoly[springs, 0].any() or model.tendon_dampingpoly[springs, 0].any():

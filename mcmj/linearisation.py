@@ -24,6 +24,8 @@ import numpy as np
 from scipy.sparse import csr_array, diags_array
 
 from mcmj.body import Body
+from mcmj.coupled_laws import CoupledLaw
+from mcmj.errors import InvalidArgumentError
 from mcmj.mjcf import checked_readout
 from mcmj.spring_laws import SpringLaw, cubic, spring_law
 from mcmj.validation import Array, as_array, require_above
@@ -151,6 +153,8 @@ def slopes(
 ) -> tuple[Array, Array, Array]:
     """p'(x1) [N/m], q'(x2) [N s/m] (or p / x1, q / x2) and the tension p(x1) [N], (L,) each."""
     law = spring_law(springs)
+    if isinstance(law, CoupledLaw):
+        raise InvalidArgumentError("springs", "a law of one spring at a time", law.name)
     k1, k3, d1, d3 = body.k1, body.k3, body.d1, body.d3
     if law is None or law.pull is cubic:
         factor = 1 if secant else 3

@@ -10,6 +10,7 @@ intrinsic: Any = extending.intrinsic  # compiled calls do not have its Python si
 
 CFunction = Any  # a ctypes function pointer
 TAG = 20120595.0  # marks what is ours in a model: the paper's year and first page
+COUPLED_TAG = TAG + 0.5  # the same, for springs whose law sees all springs
 WORDS = types.CPointer(types.int64)  # mjModel and mjData as callbacks get them
 
 
@@ -55,6 +56,19 @@ def call_pull(typingctx, address, x1, x2, k1, k3, d1, d3):
         return builder.call(builder.inttoptr(args[0], function.as_pointer()), args[1:])
 
     return types.float64(types.int64, *[types.float64] * 6), codegen
+
+
+@intrinsic
+def call_coupled(typingctx, law, x1, x2, user, count, width, pull):
+    """Call the compiled coupled law at an address; all arrays as addresses."""
+
+    def codegen(context, builder, signature, args):
+        word = ir.IntType(64)
+        function = ir.FunctionType(ir.VoidType(), [word] * 6)
+        builder.call(builder.inttoptr(args[0], function.as_pointer()), args[1:])
+        return context.get_dummy_value()
+
+    return types.none(*[types.int64] * 7), codegen
 
 
 def _int_to_pointer(element: ir.Type) -> Callable:

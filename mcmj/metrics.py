@@ -118,6 +118,45 @@ def relative_amplitude_error(outputs: Array, target: Target) -> float:
     return float(np.abs(np.ptp(values, axis=0) / wanted - 1.0).max())
 
 
+def nrmse_std(outputs: Array, targets: Array) -> float:
+    """sqrt(mean (y - y*)^2) / std(y*), all outputs together; 1 for the targets' mean.
+
+    Args:
+        outputs, targets: (T, n_outputs); std is that of the targets about their means.
+
+    Raises:
+        InvalidArgumentError: shapes that differ, NaN, or targets that never change.
+    """
+    return float(np.sqrt(nmse_var(outputs, targets)))
+
+
+def nrmse_range(outputs: Array, targets: Array) -> float:
+    """sqrt(mean (y - y*)^2 / (max y* - min y*)^2), the mean over samples and outputs.
+
+    Args, Raises: as for `nrmse_std`.
+    """
+    found, wanted = _pair(outputs, targets)
+    return _rms((found - wanted) / np.ptp(wanted, axis=0))
+
+
+def nmse_var(outputs: Array, targets: Array) -> float:
+    """mean (y - y*)^2 / var(y*), all outputs together: the square of `nrmse_std`.
+
+    Args, Raises: as for `nrmse_std`.
+    """
+    found, wanted = _pair(outputs, targets)
+    return float(((found - wanted) ** 2).sum() / ((wanted - wanted.mean(axis=0)) ** 2).sum())
+
+
+def _pair(outputs: Array, targets: Array) -> tuple[Array, Array]:
+    wanted = as_array("targets", targets, (None, None))
+    found = as_array("outputs", outputs, wanted.shape)
+    still = np.flatnonzero(np.ptp(wanted, axis=0) == 0.0)
+    if still.size:
+        raise InvalidArgumentError("targets", "columns that change", f"column {still[0]} constant")
+    return found, wanted
+
+
 def _at_rest(values: Array) -> bool:
     return bool((np.ptp(values, axis=0) <= 1e-9 * (1.0 + np.abs(values).max())).all())
 

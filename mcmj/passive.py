@@ -6,6 +6,7 @@ d3] is pulled through its sparse Jacobian by
 
     law(l - l0, dl/dt, k1, k3, d1, d3)
 
+With COUPLED_TAG in place of TAG the law is called once, for all springs (mcmj.coupled_laws).
 Under the leapfrog dl/dt is the extrapolated one.
 """
 
@@ -13,6 +14,7 @@ from collections import namedtuple
 from typing import Any
 
 import numba
+import numpy as np
 from numba import njit, types
 
 from mcmj.leapfrog import (
@@ -25,7 +27,17 @@ from mcmj.leapfrog import (
     memory_rows,
     runs_leapfrog,
 )
-from mcmj.memory import TAG, WORDS, CFunction, bits, call_pull, doubles, integers
+from mcmj.memory import (
+    COUPLED_TAG,
+    TAG,
+    WORDS,
+    CFunction,
+    bits,
+    call_coupled,
+    call_pull,
+    doubles,
+    integers,
+)
 from mcmj.structs import byte_offset, word_offsets
 
 SPRING_USER_SIZE = 7
@@ -67,6 +79,42 @@ def compile_passive() -> CFunction:
 
 
 @njit(**COMPILE)
+def add_coupled(model, data, at, leapfrog):
+    """The same where one law says all pulls from all elongations and rates (CoupledLaw)."""
+    nv, rows, n_user = model[at.nv], memory_rows(data, at), model[at.nuser_tendon]
+    rownnz, rowadr = integers(model[at.ten_J_rownnz]), integers(model[at.ten_J_rowadr])
+    column, jacobian = integers(model[at.ten_J_colind]), doubles(data[at.ten_J])
+    length, velocity = doubles(data[at.ten_length]), doubles(data[at.ten_velocity])
+    force = doubles(data[at.qfrc_passive])
+    count, law = 0, 0
+    while count < model[at.ntendon]:  # springs are the first tendons
+        user = doubles(model[at.tendon_user] + 8 * n_user * count)
+        if user[0] != COUPLED_TAG:
+            break
+        law = law if bits(user[1]) == 0 else bits(user[1])
+        count += 1
+    if law == 0:
+        return
+    scratch = np.empty((3, count))
+    for tendon in range(count):
+        first = rowadr[tendon]
+        user = doubles(model[at.tendon_user] + 8 * n_user * tendon)
+        scratch[0, tendon] = length[tendon] - user[2]
+        scratch[1, tendon] = velocity[tendon]
+        if leapfrog:
+            last = first + rownnz[tendon]
+            scratch[1, tendon] = extrapolated_rate(rows, nv, jacobian, column, first, last)
+    start = numba.int64(scratch.ctypes.data)
+    x1, x2, pull = start, start + 8 * count, start + 16 * count
+    call_coupled(law, x1, x2, model[at.tendon_user], count, n_user, pull)
+    for tendon in range(count):
+        if bits(doubles(model[at.tendon_user] + 8 * n_user * tendon)[1]) == 0:
+            continue  # cut
+        for e in range(rowadr[tendon], rowadr[tendon] + rownnz[tendon]):
+            force[column[e]] -= jacobian[e] * scratch[2, tendon]
+
+
+@njit(**COMPILE)
 def add_springs(model, data, at, leapfrog):
     """qfrc_passive -= J^T pull for every tendon with a law."""
     nv, rows, n_user = model[at.nv], memory_rows(data, at), model[at.nuser_tendon]
@@ -77,6 +125,9 @@ def add_springs(model, data, at, leapfrog):
     for tendon in range(model[at.ntendon]):
         user = doubles(model[at.tendon_user] + 8 * n_user * tendon)
         law = bits(user[1])
+        if user[0] == COUPLED_TAG:
+            add_coupled(model, data, at, leapfrog)
+            return
         if user[0] != TAG or law == 0:
             continue
         first = rowadr[tendon]

@@ -10,6 +10,7 @@ import numba
 from numba import types
 
 from mcmj.errors import InvalidArgumentError, UnknownNameError
+from mcmj.memory import TAG
 
 Pull = Callable[[float, float, float, float, float, float], float]
 
@@ -35,6 +36,11 @@ class SpringLaw:
             raise InvalidArgumentError("name", f"letters and digits, not {NATIVE!r}", self.name)
         if not callable(self.pull):
             raise InvalidArgumentError("pull", "a function of six numbers", self.pull)
+
+    @property
+    def tag(self) -> float:
+        """What marks this kind of law in tendon user data."""
+        return TAG
 
     @functools.cached_property
     def _compiled(self):

@@ -22,6 +22,8 @@ PURPOSES = (
     "schedule_forces",
     "schedule_noise",
     "rest_noise",
+    "task_inputs",
+    "probe_inputs",
     "input_search",
 )
 

@@ -46,6 +46,11 @@ CHAINS = (
     (("readout", "targets"), ("teaching",)),
     (("errors",), ("store",)),
     (("simulation", "metrics"), ("experiments.limit_cycle",)),
+    (("spring_laws",), ("coupled_laws",)),
+    (("body",), ("arrays",)),
+    (("coupled_laws", "arrays"), ("emulation",)),
+    (("simulation",), ("probing",)),
+    (("theory", "capacity", "filter_tasks"), ("probing",)),
 )
 MUJOCO = {
     "alteration",
@@ -129,7 +134,21 @@ def test_levels_do_not_import_their_own_level_or_any_above():
             assert not reachable(name) & above, name
 
 
-@pytest.mark.parametrize("name", ["targets", "metrics", "readout", "body", "generator", "store"])
+@pytest.mark.parametrize(
+    "name",
+    [
+        "targets",
+        "metrics",
+        "readout",
+        "body",
+        "generator",
+        "store",
+        "theory",
+        "arrays",
+        "capacity",
+        "filter_tasks",
+    ],
+)
 def test_plain_numerics_need_no_engine(name):
     assert not reachable(name) & {"mjcf", "laws", "engine", "simulation", "ensemble"}
     assert all("mujoco" not in outside(module) for module in {name, *reachable(name)})

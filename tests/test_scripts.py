@@ -183,3 +183,50 @@ def test_benchmark(tmp_path):
     costs = [f"{engine}_ns_per_spring_step" for engine in ("mujoco", "twin", "twin_batch")]
     for name in (*ratios, *costs, "million_step_peak_mb"):
         assert metrics[name] > 0, name
+
+
+def test_emulate(tmp_path):
+    options = ["--targets", "van_der_pol", "driven_duffing", "--integrators", "Euler", "RK4"]
+    options += ["--steps-ms", "1", "2", "4", "--horizon", "2", "--g=-x1", "--out", tmp_path]
+    status, out, err = run("emulate", *options)
+    assert status == 0, err
+    assert "driven_duffing" in out
+    metrics = metrics_of(tmp_path)["metrics"]
+    assert metrics["van_der_pol"]["Euler"]["order"] == pytest.approx(1.0, abs=0.1)
+    assert metrics["user"]["RK4"]["error"] < 1e-11
+    assert (tmp_path / "emulate.png").stat().st_size > 10_000
+
+
+def test_linearise(tmp_path):
+    options = ["--sizes", "2", "--memory-sizes", "2", "--diversities", "1", "0.1", "--train", "5"]
+    options += ["--test", "2", "--washout", "1", "--symbolic-masses", "2", "--out", tmp_path]
+    status, out, err = run("linearise", *options)
+    assert status == 0, err
+    assert "feedback linearisable: yes" in out
+    metrics = metrics_of(tmp_path)["metrics"]
+    assert metrics["linearisability"]["nonlinear spring"]["linearisable"]
+    assert metrics["controllability"]["2"]["rank"] == [4, 4, 2]
+    assert (tmp_path / "linearisability.txt").read_text() in out
+
+
+def test_filters(tmp_path):
+    options = ["--nodes", "10", "--train", "3", "--washout", "1", "--test", "2", "--symbols", "100"]
+    options += ["--test-symbols", "40", "--lesson", "20", "--exam", "20", "--engine", "twin"]
+    status, _, err = run("filters", *options, "--quiet", "--out", tmp_path)
+    assert status == 0, err
+    metrics = metrics_of(tmp_path)["metrics"]
+    for task in ("volterra", "toolbox_narma", "narma10", "delayed_recall", "switch"):
+        assert {"nrmse_std", "baseline_nrmse_std"} <= metrics[task].keys()
+    assert {"filters.png", "switch.png"} <= {path.name for path in tmp_path.iterdir()}
+
+
+def test_capacity(tmp_path):
+    options = ["--nodes", "8", "--symbols", "200", "--max-delays", "10", "3", "--streams", "10"]
+    options += ["--stream-symbols", "12", "--map-symbols", "150", "--stiffness", "1", "--damping"]
+    options += ["1", "3", "--sizes", "5", "--strengths", "1", "10", "--quiet", "--out", tmp_path]
+    status, _, err = run("capacity", *options)
+    assert status == 0, err
+    metrics = metrics_of(tmp_path)["metrics"]
+    for name in ("memory_capacity", "ipc_total", "kernel_rank"):
+        assert metrics[name] >= 0
+    assert np.shape(metrics["maps"]["size_strength"]["ipc_total"]) == (1, 2)
