@@ -22,6 +22,10 @@ PURPOSES = (
     "schedule_forces",
     "schedule_noise",
     "rest_noise",
+    "search_space",
+    "search_audit",
+    "held_out_noise",
+    "pruning_order",
 )
 
 
