@@ -26,22 +26,7 @@ def override(config: C, changes: Mapping[str, object]) -> C:
         UnknownNameError: no such field; the message lists those there are.
         InvalidArgumentError: a value of another type, or one that the config refuses.
     """
-    own: dict[str, object] = {}
-    nested: dict[str, dict[str, object]] = {}
-    for path, value in changes.items():
-        name, _, rest = path.partition(".")
-        if name not in _hints(config):
-            raise UnknownNameError(f"field of {type(config).__name__}", name, _hints(config))
-        if rest:
-            nested.setdefault(name, {})[rest] = value
-        else:
-            own[name] = fitted(path, value, _hints(config)[name])
-    for name, inner in nested.items():
-        part = own.get(name, getattr(config, name))
-        if not dataclasses.is_dataclass(part):
-            raise InvalidArgumentError(f"{name}.{next(iter(inner))}", f"no fields in {name}", part)
-        own[name] = override(part, inner)
-    return dataclasses.replace(config, **own) if own else config  # type: ignore[type-var]
+    return _override(config, changes, "")
 
 
 def value_at(config: object, path: str) -> object:
@@ -108,6 +93,26 @@ def numbers_at(metrics: Mapping[str, object], path: str) -> dict[str, float | No
 
 
 # --- inside ----------------------------------------------------------------------------------
+
+
+def _override(config: C, changes: Mapping[str, object], at: str) -> C:
+    own: dict[str, object] = {}
+    nested: dict[str, dict[str, object]] = {}
+    for path, value in changes.items():
+        name, _, rest = path.partition(".")
+        if name not in _hints(config):
+            raise UnknownNameError(f"field of {type(config).__name__}", name, _hints(config))
+        if rest:
+            nested.setdefault(name, {})[rest] = value
+        else:
+            own[name] = fitted(at + path, value, _hints(config)[name])
+    for name, inner in nested.items():
+        part = own.get(name, getattr(config, name))
+        if not dataclasses.is_dataclass(part):
+            path = f"{at}{name}.{next(iter(inner))}"
+            raise InvalidArgumentError(path, f"no fields in {name}", part)
+        own[name] = _override(part, inner, f"{at}{name}.")
+    return dataclasses.replace(config, **own) if own else config  # type: ignore[type-var]
 
 
 def _hints(config: object) -> dict[str, Any]:

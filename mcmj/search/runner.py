@@ -98,6 +98,7 @@ class _Runner:
         if not self._flying:
             return
         done, _ = wait(self._flying, timeout=_POLL, return_when=FIRST_COMPLETED)
+        failed: BaseException | None = None
         for future in done:
             key = self._flying.pop(future)
             error = _error(future)
@@ -106,7 +107,9 @@ class _Runner:
             elif self._workers.lost(error):
                 self._again(key)
             else:
-                raise error
+                failed = error
+        if failed is not None:  # after what is finished has been kept
+            raise failed
         if time.monotonic() - self._renewed > _RENEW:
             self._store.renew()
             self._renewed = time.monotonic()
