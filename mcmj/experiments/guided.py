@@ -91,7 +91,7 @@ class Config:
         if self.objective not in OBJECTIVES:
             raise UnknownNameError("objective", self.objective, OBJECTIVES)
         seen = range(self.first_seed, self.first_seed + self.bodies)
-        if self.judged_from in seen or self.first_seed in self._judged_seeds:
+        if set(seen) & set(self._judged_seeds):
             raise InvalidArgumentError("judged_from", "seeds that the search does not use", seen)
         for path in self.space:
             value_at(self.hand_chosen, path)
