@@ -34,7 +34,7 @@ from mcmj.errors import (
     UnknownNameError,
 )
 from mcmj.generator import draw_body
-from mcmj.mjcf import to_mjcf
+from mcmj.mjcf import DEFAULT_INTEGRATOR, to_mjcf
 from mcmj.search.overrides import numbers_at, override
 from mcmj.store import plain, versions
 
@@ -146,6 +146,7 @@ def trained_body(trial: Trial, account: Mapping[str, object]) -> str | None:
     return to_mjcf(
         body,
         timestep=getattr(config, "timestep", 1e-3),
+        integrator=getattr(config, "integrator", DEFAULT_INTEGRATOR),
         w_out=next(iter(readouts.values()), None),
         readouts=readouts,
         provenance=provenance,
