@@ -13,7 +13,7 @@ from mcmj.errors import DivergenceError
 from mcmj.heldout import closed_loop_errors, held_out_starts
 from mcmj.simulation import Simulation
 from mcmj.targets import Target
-from mcmj.teaching import Lesson, Teaching, follow_lessons
+from mcmj.teaching import Course, Teaching, lessons_of
 from mcmj.validation import Array, require_count, require_number
 
 NOISES = (0.02, 0.05, 0.1, 0.2, 0.4)
@@ -60,7 +60,7 @@ def select_teaching(
 
     Args:
         simulation: the body; afterwards it has the chosen readout and stands at a start.
-        teaching: everything but noise and ridge_per_row; no rest runs.
+        teaching: everything but noise and ridge_per_row.
         seed: of the noise streams.
         noises: standard deviations of the teacher noise (units of the output).
         ridges_per_row: as Teaching's.
@@ -78,13 +78,13 @@ def select_teaching(
     shape = (len(noises), len(ridges_per_row))
     errors, nrmse = np.full(shape, np.inf), np.full(shape, np.inf)
     readouts: dict[tuple[int, int], Array] = {}
-    lesson = Lesson(target.sample, teaching.duration, teaching.washout)
     for i, noise in enumerate(noises):
         simulation.reset()
-        taught = replace(teaching, noise=noise)
-        regression = follow_lessons(simulation, [lesson], taught, seed)
+        course = Course(simulation, replace(teaching, noise=noise), seed)
+        for lesson in lessons_of(target, teaching):
+            course.attend(lesson)
         for j, ridge in enumerate(ridges_per_row):
-            fit = regression.solve(ridge * regression.weight)
+            fit = course.regression.solve(ridge * course.regression.weight)
             runs = closed_loop_errors(
                 simulation, fit.w_out, begin, target, free_run=free_run, window=window
             )

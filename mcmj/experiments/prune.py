@@ -13,7 +13,7 @@ from mcmj.heldout import closed_loop_errors, held_out_starts
 from mcmj.pruning import METHODS, importance, sense_only
 from mcmj.simulation import Simulation
 from mcmj.targets import TARGETS, target
-from mcmj.teaching import Lesson, Teaching, follow_lessons
+from mcmj.teaching import Course, Teaching, lessons_of
 from mcmj.validation import Array, require_count, require_number
 
 OnRuns = Callable[[int], object]
@@ -161,8 +161,10 @@ def _of_body(one: limit_cycle.Config, config: Config, on_runs: OnRuns) -> Pruned
     wanted, teaching = target(config.task), config.teaching
     limit_cycle.check_task(one, body, wanted)
     simulation = Simulation(body, timestep=config.timestep, engine=config.engine)
-    lesson = Lesson(target(config.task).sample, teaching.duration, teaching.washout)
-    regression = follow_lessons(simulation, [lesson], teaching, one.noise_seed)
+    course = Course(simulation, teaching, one.noise_seed)
+    for lesson in lessons_of(wanted, teaching):
+        course.attend(lesson)
+    regression = course.regression
     ridge = teaching.ridge_per_row * regression.weight
     starts = held_out_starts(simulation, wanted, teaching, one.noise_seed, config.starts)
 
