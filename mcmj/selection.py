@@ -81,8 +81,7 @@ def select_teaching(
     for i, noise in enumerate(noises):
         simulation.reset()
         course = Course(simulation, replace(teaching, noise=noise), seed)
-        for lesson in lessons_of(target, teaching):
-            course.attend(lesson)
+        course.attend_all(lessons_of(target, teaching))
         for j, ridge in enumerate(ridges_per_row):
             fit = course.regression.solve(ridge * course.regression.weight)
             runs = closed_loop_errors(

@@ -162,8 +162,7 @@ def _of_body(one: limit_cycle.Config, config: Config, on_runs: OnRuns) -> Pruned
     limit_cycle.check_task(one, body, wanted)
     simulation = Simulation(body, timestep=config.timestep, engine=config.engine)
     course = Course(simulation, teaching, one.noise_seed)
-    for lesson in lessons_of(wanted, teaching):
-        course.attend(lesson)
+    course.attend_all(lessons_of(wanted, teaching))
     regression = course.regression
     ridge = teaching.ridge_per_row * regression.weight
     starts = held_out_starts(simulation, wanted, teaching, one.noise_seed, config.starts)

@@ -34,7 +34,8 @@ from mcmj.errors import (
     UnknownNameError,
 )
 from mcmj.generator import draw_body
-from mcmj.mjcf import DEFAULT_INTEGRATOR, to_mjcf
+from mcmj.mjcf import to_mjcf
+from mcmj.options import DEFAULT_INTEGRATOR
 from mcmj.search.overrides import numbers_at, override
 from mcmj.store import plain, versions
 
