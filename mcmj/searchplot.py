@@ -15,6 +15,11 @@ from mcmj.body import Body
 from mcmj.plotting import TARGET_COLOUR, TASK_COLOURS, TITLES, draw_body, new_figure
 from mcmj.validation import Array
 
+_ORDERS = {
+    "backward": "backward elimination",
+    "forward": "forward selection",
+    "random": "random order",
+}
 _LOG_FROM = 30.0  # largest over smallest value from which an axis is logarithmic
 
 
@@ -92,12 +97,10 @@ def draw_scores(
     finite = np.concatenate([scores[np.isfinite(scores)] for scores in groups.values()])
     if finite.size and finite.min() > 0 and finite.max() > _LOG_FROM * finite.min():
         axes.set_xscale("log")
-    axes.axvline(threshold, color=TARGET_COLOUR, ls="--", lw=1)
     side = "above" if maximise else "below"
-    axes.annotate(
-        f" success {side} {threshold:g}", (threshold, 0.02), color=TARGET_COLOUR,
-        xycoords=("data", "axes fraction"), ha="left",
-    )  # fmt: skip
+    axes.axvline(
+        threshold, color=TARGET_COLOUR, ls="--", lw=1, label=f"success {side} {threshold:g}"
+    )
     axes.set(xlabel=name, ylabel="share of the bodies with less", ylim=(0, 1.02))
     axes.legend(frameon=False, loc="upper left")
     axes.grid(alpha=0.3)
@@ -144,7 +147,9 @@ def pruning_figure(
     top = 3.0  # everything worse, blow-ups too, is drawn here
     for (method, table), colour in zip(errors.items(), TASK_COLOURS, strict=False):
         low, middle, high = np.quantile(np.minimum(table, top), (0.25, 0.5, 0.75), axis=0)
-        left.loglog(counts, middle, "o-", ms=3.5, lw=1.3, color=colour, label=method)
+        left.loglog(
+            counts, middle, "o-", ms=3.5, lw=1.3, color=colour, label=_ORDERS.get(method, method)
+        )
         if len(table) > 1:
             left.fill_between(counts, low, high, color=colour, alpha=0.15, lw=0)
     left.axhline(np.median(full_errors), color="0.4", ls=":", lw=1.3, label="all springs")
