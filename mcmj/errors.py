@@ -59,3 +59,7 @@ class McmjWarning(UserWarning):
 
 class StabilityWarning(McmjWarning):
     """A simulation that will blow up: its step is above the integrator's stability limit."""
+
+
+class StoreError(McmjError, ValueError):
+    """A store of trials that cannot be used: damaged, of another version, or something else."""

@@ -1,8 +1,10 @@
 """Linear static readouts: least squares and ridge regression, without normal equations."""
 
+import copy
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 from scipy.linalg import svd
 from scipy.linalg.lapack import dgeqrt
 from threadpoolctl import ThreadpoolController
@@ -64,6 +66,37 @@ class Regression:
         """Sum of the weights of all rows so far: their number where every weight is 1."""
         return self._weight
 
+    @property
+    def n_lengths(self) -> int:
+        """L, once there are samples."""
+        return self._n_lengths
+
+    @property
+    def factors(self) -> tuple[Array, Array]:
+        """Matrices (n, L) and (n, n_outputs) with the same regression as all the samples.
+
+        With a bias, the first has one column more, the last: the constant's.
+        """
+        factor = self._checked_factor()
+        n = self._n_lengths + int(self._bias)
+        return np.roll(factor[:, :n], -int(self._bias), axis=1), factor[:, n:]
+
+    def restricted(self, springs: npt.NDArray[np.int64]) -> "Regression":
+        """The same regression, of the same samples, on some of the lengths only."""
+        factor, first = self._checked_factor(), int(self._bias)
+        kept = [*range(first), *(first + np.asarray(springs))]
+        targets = range(first + self._n_lengths, factor.shape[1])
+        part = copy.copy(self)
+        part._n_lengths = len(springs)
+        with _BLAS.limit(limits=1):
+            part._factor = np.asarray(np.linalg.qr(factor[:, [*kept, *targets]], mode="r"))
+        return part
+
+    def _checked_factor(self) -> Array:
+        if self._factor is None or self._rows == 0:
+            raise InvalidArgumentError("lengths", "at least one sample", 0)
+        return self._factor
+
     def add(self, lengths: Array, targets: Array, *, weight: float | Array = 1.0) -> None:
         """Fold in samples: lengths (M, L) and targets (M, n_outputs).
 
@@ -116,10 +149,9 @@ class Regression:
             InvalidArgumentError: no samples, or a negative ridge.
         """
         require_number("ridge", ridge, 0.0)
-        if self._factor is None or self._rows == 0:
-            raise InvalidArgumentError("lengths", "at least one sample", 0)
+        factor = self._checked_factor()
         n_unknowns = self._n_lengths + int(self._bias)
-        top, reached = self._factor[:, :n_unknowns], self._factor[:, n_unknowns:]
+        top, reached = factor[:, :n_unknowns], factor[:, n_unknowns:]
         with _BLAS.limit(limits=1):
             weights, values = self._minimise(top, reached, ridge)
             residual = reached - top @ weights

@@ -1,6 +1,7 @@
 """Result files: whole or not at all, each with its config, seed and versions. No pickle."""
 
 import dataclasses
+import functools
 import json
 import os
 import platform
@@ -20,6 +21,11 @@ _PACKAGES = ("mcmj", "mujoco", "numpy", "scipy", "numba")
 
 def versions() -> dict[str, str]:
     """Versions of what a result depends on."""
+    return dict(_versions())
+
+
+@functools.cache  # reading them takes milliseconds
+def _versions() -> dict[str, str]:
     found = {"python": platform.python_version()}
     for package in _PACKAGES:
         try:

@@ -45,6 +45,13 @@ CHAINS = (
     (("validation",), ("readout",)),
     (("readout", "targets"), ("teaching",)),
     (("errors",), ("store",)),
+    (("teaching", "metrics"), ("heldout",)),
+    (("heldout",), ("selection",)),
+    (("readout",), ("pruning",)),
+    (("search.overrides", "search.space"), ("search.experiment",)),
+    (("search.experiment",), ("search.database",)),
+    (("search.database", "search.workers"), ("search.runner",)),
+    (("search.runner",), ("experiments.search",)),
     (("simulation", "metrics"), ("experiments.limit_cycle",)),
     (("spring_laws",), ("coupled_laws",)),
     (("body",), ("arrays",)),
@@ -156,8 +163,9 @@ def test_plain_numerics_need_no_engine(name):
 
 def test_plotting_takes_results_and_never_simulates():
     forbidden = {"simulation", "ensemble", "engine", "teaching", "laws", "mjcf", "bodyfile"}
-    assert not reachable("plotting") & forbidden
-    assert not any(name.startswith("experiments.") for name in reachable("plotting"))
+    for name in ("plotting", "searchplot"):
+        assert not reachable(name) & forbidden
+        assert not any(other.startswith("experiments.") for other in reachable(name))
 
 
 def test_library_does_not_know_its_experiments_or_command_lines():

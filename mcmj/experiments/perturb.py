@@ -144,6 +144,17 @@ class Result:
     bodies: list[BodyResult]
 
     @property
+    def body(self) -> Body:
+        """The first body."""
+        return self.bodies[0].body
+
+    @property
+    def readouts(self) -> dict[str, Array]:
+        """The first body's readout by task; empty if it blew up under the teacher."""
+        fit = self.bodies[0].fit
+        return {} if fit is None else {self.config.task: fit.w_out}
+
+    @property
     def metrics(self) -> dict[str, object]:
         """As written to metrics.json: the first body's numbers, and counts over all seeds."""
         first, config = self.bodies[0], self.config

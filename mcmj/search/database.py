@@ -1,0 +1,267 @@
+"""A store of trials: one SQLite file, safe against kills, and against two searches at once.
+
+A trial is written in one transaction when it ends (write-ahead log, so a process killed at any
+moment loses at most trials that still run). Before a trial runs it is claimed for a while, and
+the claim is renewed as long as the search lives: another search on the same store then waits
+for the result instead of running the trial again, and takes over what a dead one left.
+"""
+
+import json
+import os
+import socket
+import sqlite3
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import Any
+
+from mcmj.errors import InvalidArgumentError, OutputError, StoreError
+from mcmj.search.experiment import Outcome, Trial
+from mcmj.store import plain
+
+APPLICATION = 0x6D636D6A  # "mcmj", in the file's header
+SCHEMA = 1
+LEASE = 60.0  # s: a claim that was not renewed for so long is void
+_PATIENCE = 60.0  # s to wait for another process's write
+_BATCH = 500  # keys in one query
+
+_TABLES = """
+CREATE TABLE trials (
+    key TEXT PRIMARY KEY, experiment TEXT NOT NULL, seed INTEGER, config TEXT NOT NULL,
+    versions TEXT NOT NULL, status TEXT NOT NULL, metrics TEXT NOT NULL, message TEXT NOT NULL,
+    seconds REAL NOT NULL, finished TEXT NOT NULL
+) WITHOUT ROWID;
+CREATE TABLE claims (key TEXT PRIMARY KEY, owner TEXT NOT NULL, until REAL NOT NULL) WITHOUT ROWID;
+"""
+
+
+class TrialStore:
+    """The trials of any number of searches, by key.
+
+    Columns of the table `trials`: key, experiment, seed, config (JSON), versions (JSON),
+    status (done or diverged), metrics (JSON), message, seconds, finished (UTC).
+
+    Args:
+        path: of the file; made if there is none.
+        create: if False, a missing file is an error.
+
+    Raises:
+        StoreError: damaged, of another version of the schema, or not a store at all.
+        OutputError: it cannot be opened or written.
+        InvalidArgumentError: no such file, with create=False.
+    """
+
+    def __init__(self, path: str | Path, *, create: bool = True) -> None:
+        self.path = Path(path)
+        if not create and not self.path.is_file():
+            raise InvalidArgumentError("store", "an existing file", self.path)
+        self._owner = _own_name()
+        with self._translated():
+            self._db = sqlite3.connect(self.path, timeout=_PATIENCE, isolation_level=None)
+        try:
+            with self._translated():
+                self._open()
+        except BaseException:
+            self._db.close()
+            raise
+
+    def __enter__(self) -> "TrialStore":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Give back all claims and close the file."""
+        with suppress(sqlite3.Error):
+            self._db.execute("DELETE FROM claims WHERE owner = ?", [self._owner])
+        self._db.close()
+
+    def __len__(self) -> int:
+        with self._translated():
+            return int(self._db.execute("SELECT count(*) FROM trials").fetchone()[0])
+
+    def outcomes(self, keys: Sequence[str]) -> dict[str, Outcome]:
+        """Outcomes of those trials that are finished, by key."""
+        found: dict[str, Outcome] = {}
+        with self._translated():
+            for some in _batches(keys):
+                rows = self._db.execute(
+                    "SELECT key, status, metrics, message, seconds, versions FROM trials"
+                    f" WHERE key IN ({','.join('?' * len(some))})",
+                    some,
+                )
+                for key, status, metrics, message, seconds, versions in rows:
+                    found[key] = Outcome(
+                        status, json.loads(metrics), message, seconds, json.loads(versions)
+                    )
+        return found
+
+    def claim(self, keys: Sequence[str]) -> set[str]:
+        """Those of the trials that are ours to run: not finished, and nobody else runs them."""
+        mine: set[str] = set()
+        with self._transaction():
+            for key in keys:
+                if self._db.execute("SELECT 1 FROM trials WHERE key = ?", [key]).fetchone():
+                    continue
+                held = self._db.execute(
+                    "SELECT owner, until FROM claims WHERE key = ?", [key]
+                ).fetchone()
+                if held is None or held[0] == self._owner or not _alive(*held):
+                    self._db.execute(
+                        "INSERT OR REPLACE INTO claims VALUES (?, ?, ?)",
+                        [key, self._owner, time.time() + LEASE],
+                    )
+                    mine.add(key)
+        return mine
+
+    def renew(self) -> None:
+        """Keep our claims: call it well within LEASE seconds."""
+        with self._transaction():
+            self._db.execute(
+                "UPDATE claims SET until = ? WHERE owner = ?", [time.time() + LEASE, self._owner]
+            )
+
+    def add(self, trial: Trial, outcome: Outcome) -> None:
+        """Keep a finished trial; if there is one of its key, that one stays."""
+        finished = time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime())
+        row = [
+            trial.key, trial.experiment, trial.seed, _text(plain(trial.config)),
+            _text(outcome.versions), outcome.status, _text(outcome.metrics), outcome.message,
+            outcome.seconds, finished,
+        ]  # fmt: skip
+        with self._transaction():
+            self._db.execute(
+                f"INSERT OR IGNORE INTO trials VALUES ({','.join('?' * len(row))})", row
+            )
+            self._db.execute("DELETE FROM claims WHERE key = ?", [trial.key])
+
+    def rows(self) -> Iterator[dict[str, Any]]:
+        """All trials, JSON decoded, in the order of their keys."""
+        with self._translated():
+            cursor = self._db.execute("SELECT * FROM trials ORDER BY key")
+            names = [column[0] for column in cursor.description]
+            for values in cursor:
+                row = dict(zip(names, values, strict=True))
+                yield row | {n: json.loads(row[n]) for n in ("config", "versions", "metrics")}
+
+    # --- inside ------------------------------------------------------------------------------
+
+    def _open(self) -> None:
+        self._db.execute(f"PRAGMA busy_timeout = {round(1e3 * _PATIENCE)}")
+        application = self._pragma("application_id")
+        if application == 0 and self._is_empty():
+            self._create()
+        elif application != APPLICATION:
+            raise StoreError(f"{self.path}: a database, but not a store of mcmj's trials")
+        if (schema := self._pragma("user_version")) != SCHEMA:
+            raise StoreError(
+                f"{self.path}: a store of schema version {schema}, this mcmj has version {SCHEMA};"
+                " use the mcmj that wrote it (it can export to CSV), or another file"
+            )
+        fault = self._pragma("quick_check")
+        if fault != "ok":
+            raise StoreError(f"{self.path}: damaged ({fault}); {_RESCUE}")
+        self._db.execute("PRAGMA journal_mode = WAL")
+        self._db.execute("PRAGMA synchronous = NORMAL")
+        with self._transaction():  # a read-only file is refused now and not after the first trial
+            self._db.execute("DELETE FROM claims WHERE until < ?", [time.time()])
+
+    def _create(self) -> None:
+        self._db.execute("PRAGMA journal_mode = WAL")
+        with self._transaction():
+            if self._is_empty():  # else another process was faster
+                for statement in _TABLES.split(";")[:-1]:
+                    self._db.execute(statement)
+                self._db.execute(f"PRAGMA application_id = {APPLICATION}")
+                self._db.execute(f"PRAGMA user_version = {SCHEMA}")
+
+    def _is_empty(self) -> bool:
+        return self._db.execute("SELECT count(*) FROM sqlite_master").fetchone()[0] == 0
+
+    def _pragma(self, name: str) -> Any:
+        return self._db.execute(f"PRAGMA {name}").fetchone()[0]
+
+    @contextmanager
+    def _transaction(self) -> Iterator[None]:
+        """All or nothing; waits until no other process writes."""
+        with self._translated():
+            self._db.execute("BEGIN IMMEDIATE")
+            try:
+                yield
+                self._db.execute("COMMIT")
+            except BaseException:
+                if self._db.in_transaction:
+                    self._db.execute("ROLLBACK")
+                raise
+
+    @contextmanager
+    def _translated(self) -> Iterator[None]:
+        """SQLite's errors as ours, saying what to do."""
+        try:
+            yield
+        except sqlite3.Error as error:
+            raise _as_ours(self.path, error) from error
+
+
+_RESCUE = (
+    "nothing was changed; `sqlite3 FILE .recover` may save its trials, or start with another file"
+)
+_REASONS = {
+    sqlite3.SQLITE_FULL: "the disk is full; finished trials are kept: make room and run again",
+    sqlite3.SQLITE_READONLY: "read-only; give --store a file that can be written",
+    sqlite3.SQLITE_CANTOPEN: "cannot be opened or made there; give --store another file",
+    sqlite3.SQLITE_PERM: "no permission; give --store a file that can be written",
+    sqlite3.SQLITE_IOERR: "the disk does not take it; finished trials are kept",
+    sqlite3.SQLITE_BUSY: f"another program has locked it for over {_PATIENCE:g} s",
+}
+
+
+def _as_ours(path: Path, error: sqlite3.Error) -> StoreError | OutputError:
+    code = getattr(error, "sqlite_errorcode", sqlite3.SQLITE_ERROR) & 0xFF
+    if code in (sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_NOTADB):
+        return StoreError(f"{path}: damaged, or not a store of trials ({error}); {_RESCUE}")
+    return OutputError(f"{path}: {_REASONS.get(code, 'SQLite failed')} ({error})")
+
+
+def _text(value: object) -> str:
+    return json.dumps(value, sort_keys=True, allow_nan=False)
+
+
+def _batches(keys: Sequence[str]) -> Iterator[Sequence[str]]:
+    for first in range(0, len(keys), _BATCH):
+        yield keys[first : first + _BATCH]
+
+
+def _own_name() -> str:
+    """host/process-namespace/process/start time/random: no two stores have the same."""
+    place = [socket.gethostname(), _process_space(), str(os.getpid()), _born(os.getpid())]
+    return "/".join([*place, os.urandom(4).hex()])
+
+
+def _alive(owner: str, until: float) -> bool:
+    """Whether a claim holds: renewed in time, and its process not seen to be dead."""
+    if until < time.time():
+        return False
+    host, space, process, born, _ = owner.split("/")
+    if (host, space) != (socket.gethostname(), _process_space()) or not born:
+        return True  # from elsewhere: only time will tell
+    return _born(int(process)) == born
+
+
+def _process_space() -> str:
+    try:
+        return os.readlink("/proc/self/ns/pid")
+    except OSError:
+        return ""
+
+
+def _born(process: int) -> str:
+    """Start time of a process, "" if there is none or nobody says."""
+    try:
+        stat = Path(f"/proc/{process}/stat").read_text()
+    except OSError:
+        return ""
+    state, *rest = stat.rpartition(")")[2].split()
+    return "" if state == "Z" else rest[18]

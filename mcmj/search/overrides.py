@@ -1,0 +1,183 @@
+"""Fields of nested frozen dataclasses by dotted path, and numbers of nested metrics likewise."""
+
+import dataclasses
+import functools
+import json
+import types
+import typing
+from collections.abc import Iterator, Mapping
+from typing import Any, TypeVar
+
+from mcmj.errors import InvalidArgumentError, UnknownNameError
+
+C = TypeVar("C")
+
+ANY = "*"
+
+
+def override(config: C, changes: Mapping[str, object]) -> C:
+    """A config with other values at dotted paths such as "teaching.noise" or "settings.d1".
+
+    Values are fitted to the field's type: lists become tuples, integers floats. The new config
+    is checked as any: its dataclasses check themselves on construction, once, with all changes
+    made.
+
+    Raises:
+        UnknownNameError: no such field; the message lists those there are.
+        InvalidArgumentError: a value of another type, or one that the config refuses.
+    """
+    return _override(config, changes, "")
+
+
+def value_at(config: object, path: str) -> object:
+    """The value of a config at a dotted path.
+
+    Raises:
+        UnknownNameError: no such field.
+    """
+    for name in path.split("."):
+        names = [f.name for f in dataclasses.fields(config)]  # type: ignore[arg-type]
+        if name not in names:
+            raise UnknownNameError(f"field of {type(config).__name__}", name, names)
+        config = getattr(config, name)
+    return config
+
+
+def parse_assignment(text: str) -> tuple[str, object]:
+    """ "path=value" -> (path, value); the value is JSON, or else a plain string.
+
+    Raises:
+        InvalidArgumentError: no "=", or nothing before it.
+    """
+    path, sign, value = text.partition("=")
+    if not sign or not path.strip():
+        raise InvalidArgumentError("setting", "path=value, as in teaching.noise=0.1", repr(text))
+    return path.strip(), parse_value(value)
+
+
+def parse_value(text: str) -> object:
+    """JSON, or else the text itself."""
+    try:
+        return json.loads(text)
+    except json.JSONDecodeError:
+        return text.strip()
+
+
+def fitted(path: str, value: object, hint: Any) -> object:
+    """`value` as the type `hint` of a config's field.
+
+    Raises:
+        InvalidArgumentError: it cannot be that.
+    """
+    try:
+        return _fit(value, hint)
+    except TypeError:
+        raise InvalidArgumentError(
+            path, getattr(hint, "__name__", str(hint)), repr(value)
+        ) from None
+
+
+def numbers_at(metrics: Mapping[str, object], path: str) -> dict[str, float | None]:
+    """All numbers at a dotted path into nested metrics, by their full paths.
+
+    "*" stands for every key below which the rest of the path leads to a number; None stands
+    for a number that is not finite, as in metrics.json.
+
+    Raises:
+        UnknownNameError: the path leads to no number; the message lists those that do.
+    """
+    found = dict(_numbers(metrics, path.split("."), ""))
+    if not found:
+        raise UnknownNameError("number of the metrics", path, sorted(_leaves(metrics, "")))
+    return found
+
+
+# --- inside ----------------------------------------------------------------------------------
+
+
+def _override(config: C, changes: Mapping[str, object], at: str) -> C:
+    own: dict[str, object] = {}
+    nested: dict[str, dict[str, object]] = {}
+    for path, value in changes.items():
+        name, _, rest = path.partition(".")
+        if name not in _hints(config):
+            raise UnknownNameError(f"field of {type(config).__name__}", name, _hints(config))
+        if rest:
+            nested.setdefault(name, {})[rest] = value
+        else:
+            own[name] = fitted(at + path, value, _hints(config)[name])
+    for name, inner in nested.items():
+        part = own.get(name, getattr(config, name))
+        if not dataclasses.is_dataclass(part):
+            path = f"{at}{name}.{next(iter(inner))}"
+            raise InvalidArgumentError(path, f"no fields in {name}", part)
+        own[name] = _override(part, inner, f"{at}{name}.")
+    return dataclasses.replace(config, **own) if own else config  # type: ignore[type-var]
+
+
+def _hints(config: object) -> dict[str, Any]:
+    if not dataclasses.is_dataclass(config):
+        raise InvalidArgumentError("config", "a dataclass", type(config).__name__)
+    return _hints_of(type(config))  # type: ignore[arg-type]
+
+
+@functools.cache
+def _hints_of(kind: type) -> dict[str, Any]:
+    hints = typing.get_type_hints(kind)
+    return {f.name: hints[f.name] for f in dataclasses.fields(kind) if f.init}
+
+
+def _fit(value: object, hint: Any) -> object:
+    origin, arguments = typing.get_origin(hint), typing.get_args(hint)
+    if origin in (typing.Union, types.UnionType):
+        return _fit_any(value, arguments)
+    if origin is tuple:
+        return _fit_tuple(value, arguments)
+    if hint is float and isinstance(value, int) and not isinstance(value, bool):
+        return float(value)
+    plain = hint if isinstance(hint, type) else origin
+    if not isinstance(plain, type):  # what we do not understand, the config checks
+        return value
+    if not isinstance(value, plain) or (isinstance(value, bool) and plain in (int, float)):
+        raise TypeError
+    return value
+
+
+def _fit_any(value: object, hints: tuple[Any, ...]) -> object:
+    for hint in hints:
+        try:
+            return _fit(value, hint)
+        except TypeError:
+            continue
+    raise TypeError
+
+
+def _fit_tuple(value: object, hints: tuple[Any, ...]) -> tuple[object, ...]:
+    if not isinstance(value, list | tuple):
+        raise TypeError
+    if len(hints) == 2 and hints[1] is Ellipsis:
+        return tuple(_fit(item, hints[0]) for item in value)
+    if len(value) != len(hints):
+        raise TypeError
+    return tuple(_fit(item, hint) for item, hint in zip(value, hints, strict=True))
+
+
+def _numbers(node: object, path: list[str], at: str) -> Iterator[tuple[str, float | None]]:
+    if not path:
+        if node is None:
+            yield at, None
+        elif isinstance(node, int | float) and not isinstance(node, bool):
+            yield at, float(node)
+        return
+    if isinstance(node, Mapping):
+        for name in node if path[0] == ANY else [path[0]]:
+            if name in node:
+                yield from _numbers(node[name], path[1:], f"{at}.{name}" if at else name)
+
+
+def _leaves(node: object, at: str) -> Iterator[str]:
+    if isinstance(node, Mapping):
+        for name, item in node.items():
+            yield from _leaves(item, f"{at}.{name}" if at else name)
+    elif isinstance(node, int | float):
+        yield at
