@@ -1,0 +1,86 @@
+"""Figs. 10 and 11: a body whose rhythm is chosen by its input. With --seeds n: how many learn it."""
+
+from pathlib import Path
+
+import numpy as np
+from rich.console import Console
+from rich.table import Table
+
+from mcmj import store
+from mcmj.cli import Output, main
+from mcmj.experiments.input_driven import Result, run
+from mcmj.experiments.input_driven_config import Config, total_steps
+from mcmj.inputplot import input_curves_figure, jumps_figure
+from mcmj.mjcf import to_mjcf
+from mcmj.plotting import save
+from mcmj.progress import progress_bar
+
+
+def work(config: Config, output: Output, out: Path) -> None:
+    with progress_bar("teaching, running", total_steps(config), quiet=output.quiet) as on_steps:
+        result = run(config, on_steps=on_steps)
+    first = result.first
+    store.write_text(out / "body.xml", body_file(result))
+    save(curves(result), out / "input_curves.png")
+    jumps = {u: first.held[u] for u in config.inputs}
+    runs = {u: (h.target, h.outputs, h.orbit_error) for u, h in jumps.items()}
+    save(jumps_figure(runs, config.timestep, config.course.last), out / "input_jumps.png")
+    arrays = {f"eps_{u:g}/outputs": held.outputs for u, held in first.held.items()}
+    store.write_arrays(out / "trajectory.npz", arrays, config, config.seed)
+    store.write_metrics(out / "metrics.json", "input_driven", config, config.seed, result.metrics)
+    if not output.quiet:
+        show(result, out)
+
+
+def body_file(result: Result) -> str:
+    """MJCF of the first body with its readout and the range of inputs it was taught with."""
+    first, config = result.first, result.config
+    return to_mjcf(
+        first.start.body,
+        timestep=config.timestep,
+        w_out=first.w_out,
+        readouts={config.readout or "input_driven": first.w_out},
+        provenance={
+            "body": first.start.source,
+            "config": store.plain(config),
+            "taught_inputs": list(first.start.taught),
+        },
+    )
+
+
+def curves(result: Result):
+    """Fig. 10 from the first body's runs."""
+    first = result.first
+    inputs, runs = np.array(list(first.held)), list(first.held.values())
+    target = np.array([(h.target_amplitude, 1.0 / h.target.period) for h in runs]).T
+    held = np.array([(h.amplitude, h.frequency) for h in runs]).T
+    branches = first.sweep.body if first.sweep else ()
+    sweep = [(b.inputs, b.amplitudes, b.frequencies) for b in branches]
+    return input_curves_figure((inputs, *target), (inputs, *held), sweep, first.start.taught)
+
+
+def show(result: Result, out: Path) -> None:
+    config, first = result.config, result.first
+    table = Table(title=f"last {config.window:g} s of {config.free_run:g} s at constant input")
+    for column in ("input", "orbit error", "amplitude error", "frequency error"):
+        table.add_column(column, justify="right")
+    for u, held in first.held.items():
+        errors = (held.orbit_error, held.amplitude_error, held.frequency_error)
+        table.add_row(f"{u:g}", *(f"{100 * error:.2f} %" for error in errors))
+    console = Console()
+    console.print(table)
+    if first.sweep:
+        found = first.sweep.metrics
+        for name in ("amplitude", "frequency"):
+            console.print(
+                f"sweep down and up: {name} differs by {100 * found[f'{name}_hysteresis']:.1f} % "
+                f"at most (target: {100 * found[f'target_{name}_hysteresis']:.1f} %)"
+            )
+    if config.seeds > 1:
+        for name, row in result.rates.items():
+            console.print(f"input {name}: {row['successes']} of {row['of']} bodies")
+    console.print(f"results in {out}")
+
+
+if __name__ == "__main__":
+    main("input_driven", Config, work)
