@@ -95,7 +95,7 @@ def jumps_figure(
 def _draw_run(
     row: Sequence[Axes], target: Target, outputs: Array, timestep: float, shown: float
 ) -> None:
-    times = timestep * np.arange(len(outputs))
+    times = timestep * np.arange(len(outputs), dtype=np.float64)
     rows = min(round(shown / timestep), len(outputs))
     for c in range(2):
         row[0].plot(times[:rows], outputs[:rows, c], lw=1.2, **OUTPUT_STYLES[c])

@@ -14,12 +14,18 @@ import numpy.typing as npt
 from mcmj.errors import InvalidArgumentError
 from mcmj.validation import Array, require_number
 
-KINDS = {"lin": "lin START STOP SECONDS", "log": "log START STOP SECONDS", "hold": "hold VALUE SECONDS"}  # fmt: skip
+KINDS = {
+    "lin": "lin START STOP SECONDS",
+    "log": "log START STOP SECONDS",
+    "hold": "hold VALUE SECONDS",
+}
 
 
 @dataclass(frozen=True)
 class Ramp:
     """u(t) = start + (stop - start) t / duration, or start (stop / start)^(t / duration).
+
+    Written so that both ends are exact.
 
     Attributes:
         start, stop: values at both ends; positive if geometric.
@@ -48,8 +54,8 @@ class Ramp:
         """u (T,) at times (T,) [s]; before 0 and after the duration it stays at its ends."""
         share = np.clip(np.asarray(times, dtype=np.float64) / self.duration, 0.0, 1.0)
         if self.geometric:
-            return self.start * (self.stop / self.start) ** share
-        return self.start + (self.stop - self.start) * share
+            return self.start ** (1.0 - share) * self.stop**share
+        return self.start * (1.0 - share) + self.stop * share
 
     def __str__(self) -> str:
         if self.start == self.stop:
@@ -127,6 +133,4 @@ def _parse_ramp(text: str) -> Ramp:
         numbers = []
     if kind not in KINDS or len(numbers) != len(KINDS[kind].split()) - 1:
         raise InvalidArgumentError("profile", f"parts like {', '.join(KINDS.values())}", repr(text))
-    if kind == "hold":
-        return hold(*numbers)
-    return Ramp(*numbers, geometric=kind == "log")
+    return Ramp(numbers[0], numbers[-2], numbers[-1], geometric=kind == "log")

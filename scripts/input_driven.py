@@ -1,8 +1,9 @@
-"""Figs. 10 and 11: a body whose rhythm is chosen by its input. With --seeds n: how many learn it."""
+"""Figs. 10 and 11: the input chooses a body's rhythm. With --seeds n: how many bodies learn it."""
 
 from pathlib import Path
 
 import numpy as np
+from matplotlib.figure import Figure
 from rich.console import Console
 from rich.table import Table
 
@@ -48,7 +49,7 @@ def body_file(result: Result) -> str:
     )
 
 
-def curves(result: Result):
+def curves(result: Result) -> Figure:
     """Fig. 10 from the first body's runs."""
     first = result.first
     inputs, runs = np.array(list(first.held)), list(first.held.values())

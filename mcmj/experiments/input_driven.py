@@ -6,7 +6,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from mcmj import metrics
-from mcmj.body import Body
 from mcmj.errors import DivergenceError, InvalidArgumentError
 from mcmj.experiments.input_driven_config import (
     SYSTEM,
@@ -131,15 +130,16 @@ def run(config: Config, *, on_steps: OnSteps = lambda steps: None) -> Result:
     start = get_start(config, config.seed)
     warn_outside(config, start.taught)
     teacher = SYSTEM.follow(course) if start.w_out is None else None
-    bodies = [_of_body(config, start, config.seed, teacher, config.all_inputs, on_steps)]
-    for seed in range(config.seed + 1, config.seed + config.seeds):
-        bodies.append(_of_other(config, seed, teacher, on_steps))
+    first = _of_body(config, start, config.seed, teacher, config.all_inputs, on_steps)
+    others = [
+        _of_other(config, seed, teacher, on_steps)
+        for seed in range(config.seed + 1, config.seed + config.seeds)
+    ]
     errors = {
-        u: np.array([np.inf if b is None else b.held[u].orbit_error for b in bodies])
+        u: np.array([np.inf if b is None else b.held[u].orbit_error for b in [first, *others]])
         for u in config.inputs
     }
-    assert bodies[0] is not None
-    return Result(config, bodies[0], errors)
+    return Result(config, first, errors)
 
 
 def _of_body(
@@ -202,7 +202,7 @@ def _hold(config: Config, simulation: Simulation, value: float, on_steps: OnStep
     target = SYSTEM.cycle(value)
     check_window(config, target)
     try:
-        outputs = drive(simulation, hold(value, config.free_run), on_steps)
+        outputs = drive(simulation, Profile([hold(value, config.free_run)]), on_steps)
     except DivergenceError:
         return Held(target, np.zeros((0, 2)))
     last = outputs[-round(config.window / config.timestep) :]
@@ -224,10 +224,10 @@ def _sweep(
 ) -> Sweep:
     """From the simulation's state: lead-in at the largest input, then down and up again."""
     profile = sweep_profile(config, taught)
-    drive(simulation, hold(profile.ramps[0].start, LEAD_IN), on_steps)
+    drive(simulation, Profile([hold(profile.ramps[0].start, LEAD_IN)]), on_steps)
     step = config.timestep
     outputs = drive(simulation, profile, on_steps)
-    wanted = SYSTEM.follow(profile)(step * np.arange(len(outputs)))
+    wanted = SYSTEM.follow(profile)(step * np.arange(len(outputs), dtype=np.float64))
     return Sweep(*(branches(profile, signal[:, 0], step) for signal in (outputs, wanted)))
 
 

@@ -91,7 +91,7 @@ class Config:
             raise InvalidArgumentError("body", "no settings or seeds beside it", self.body)
         if self.readout is not None and self.body is None:
             raise InvalidArgumentError("readout", "a body file that holds it", self.readout)
-        self.course  # noqa: B018  checks profile and run-in
+        self.teaching  # noqa: B018  checks the rest
 
     @property
     def course(self) -> Profile:
