@@ -75,8 +75,8 @@ def jumps_figure(
     figure = new_figure(14.0, 2.8 * len(runs) + 0.5)
     axes = figure.subplots(len(runs), 3, width_ratios=[1.7, 1.7, 1.0], squeeze=False)
     for (value, (target, outputs, error)), row in zip(runs.items(), axes, strict=True):
-        step = "stays at" if value == last_input else f"jumps from {last_input:g} to"
-        row[0].set_title(f"input {step} {value:g} at 0 s")
+        jump = f"jumps from {last_input:g} to {value:g} at 0 s"
+        row[0].set_title(f"input stays at {value:g}" if value == last_input else f"input {jump}")
         row[2].set_title(f"orbit error {100 * error:.2f} %")
         if len(outputs):
             _draw_run(row, target, outputs, timestep, shown)

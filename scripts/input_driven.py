@@ -71,11 +71,12 @@ def show(result: Result, out: Path) -> None:
     console = Console()
     console.print(table)
     if first.sweep:
-        found = first.sweep.metrics
+        found = first.sweep.differences(min(config.inputs))
         for name in ("amplitude", "frequency"):
+            own, targets = (found[f"{whose}{name}_hysteresis"] for whose in ("", "target_"))
             console.print(
-                f"sweep down and up: {name} differs by {100 * found[f'{name}_hysteresis']:.1f} % "
-                f"at most (target: {100 * found[f'target_{name}_hysteresis']:.1f} %)"
+                f"sweep down and up, from {min(config.inputs):g} on: {name} differs by "
+                f"{100 * own:.1f} % at most (target: {100 * targets:.1f} %)"
             )
     if config.seeds > 1:
         for name, row in result.rates.items():

@@ -86,7 +86,7 @@ def test_point_symmetry():
 
 def test_times_outside_are_refused():
     goal = HOPF.follow(Profile([hold(1.0, 2.0)]))
-    with pytest.raises(InvalidArgumentError, match="times: expected times from 0 to 2 s, got 2.1"):
+    with pytest.raises(InvalidArgumentError, match=r"expected times from 0 to 2 s, got 2\.1"):
         goal([1.0, 2.1])
     with pytest.raises(InvalidArgumentError, match="got -1 s"):
         goal([-1.0])

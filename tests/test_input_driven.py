@@ -53,14 +53,20 @@ def branch(amplitude, frequency=0.2):
 
 def test_hysteresis_is_the_difference_between_the_ways():
     sweep = Sweep(body=(branch(1.1), branch(1.05, 0.21)), target=(branch(1.0), branch(1.0, 0.2)))
-    found = sweep.metrics
+    found = sweep.differences()
+    assert found["inputs"] == pytest.approx((0.1, 5.0))
     assert found["amplitude_hysteresis"] == pytest.approx(0.05)
     assert found["target_amplitude_hysteresis"] == 0.0
     assert found["amplitude_error"] == pytest.approx(0.1)
     assert found["frequency_hysteresis"] == pytest.approx(0.05)
     assert found["frequency_error"] == pytest.approx(0.05)
     lost = replace(sweep, body=(branch(1.0), Branch(*np.empty((3, 0)))))
-    assert set(lost.metrics.values()) == {np.inf}
+    assert set(lost.differences().values()) == {np.inf, None}
+    low = Branch(np.array([0.1, 0.2, 5.0]), np.array([2.0, 1.0, 1.0]), np.full(3, 0.2))
+    from_low = replace(sweep, body=(low, branch(1.0)))
+    assert from_low.differences()["amplitude_hysteresis"] == pytest.approx(1.0)
+    assert from_low.differences(0.2)["amplitude_hysteresis"] == pytest.approx(0.0, abs=1e-12)
+    assert from_low.differences(6.0)["inputs"] is None
 
 
 def test_branches_are_the_two_ways_by_increasing_input():
@@ -102,7 +108,10 @@ def test_errors_are_what_their_names_say(result):
     assert set(table["eps"]) == {"1", "1.2", "2"}
     assert {"orbit_error", "amplitude_error", "frequency_error"} <= set(table["eps"]["2"])
     assert table["taught_inputs"] == (1.0, 2.0)
-    assert np.isfinite(list(table["sweep"].values())).all()
+    low, high = table["sweep"]["inputs"]
+    assert low == pytest.approx(1.2, rel=0.1)
+    assert 1.3 < high <= 2.0
+    assert 0.0 < table["sweep"]["amplitude_hysteresis"] < 0.2
 
 
 def test_the_input_changes_the_rhythm_the_right_way(result):

@@ -92,7 +92,7 @@ class Result:
         first = self.first
         table: dict[str, object] = {
             "eps": {f"{u:g}": run.metrics for u, run in first.held.items()},
-            "sweep": first.sweep.metrics if first.sweep else None,
+            "sweep": self.sweep,
             "taught_inputs": first.start.taught,
             "train_nrmse": first.fit.train_nrmse if first.fit else None,
             "condition_number": first.fit.condition_number if first.fit else None,
@@ -100,6 +100,17 @@ class Result:
         if self.config.seeds > 1:
             table["rates"] = self.rates
         return table
+
+    @property
+    def sweep(self) -> dict[str, object] | None:
+        """Hysteresis from the smallest of the inputs jumped to on, and over the whole range."""
+        sweep = self.first.sweep
+        if sweep is None:
+            return None
+        return {
+            **sweep.differences(min(self.config.inputs)),
+            "whole_range": sweep.differences(),
+        }
 
     @property
     def rates(self) -> dict[str, dict[str, object]]:

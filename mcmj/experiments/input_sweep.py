@@ -1,6 +1,7 @@
 """A slow sweep of the input down and up again: does the rhythm depend on the way?"""
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -9,6 +10,11 @@ from mcmj.rhythm import Cycles, cycles
 from mcmj.validation import Array
 
 GRID = 40  # inputs at which both ways are compared
+NAMES = tuple(
+    name
+    for word in ("amplitude", "frequency")
+    for name in (f"{word}_hysteresis", f"target_{word}_hysteresis", f"{word}_error")
+)
 
 
 @dataclass(frozen=True)
@@ -35,36 +41,29 @@ class Sweep:
     body: tuple[Branch, Branch]
     target: tuple[Branch, Branch]
 
-    @property
-    def metrics(self) -> dict[str, float]:
-        """Largest differences, over the inputs that all branches reach.
+    def differences(self, lowest: float = 0.0) -> dict[str, Any]:
+        """Largest differences over the inputs from `lowest` on that all branches reach.
 
-        <quantity>_hysteresis: |down - up| / the target's mean of both, of the body;
+        <quantity>_hysteresis: |down - up| of the body over the target's mean of both;
         target_<quantity>_hysteresis: of the target itself; <quantity>_error: |body - target| /
-        target, on the same way. Infinite where the rhythm was lost.
+        target on the same way; inputs: the range compared. Infinite where the rhythm was lost.
         """
         branches = [*self.body, *self.target]
-        lost = any(len(branch.inputs) < 2 for branch in branches)
-        low = np.inf if lost else max(branch.inputs[0] for branch in branches)
-        high = 0.0 if lost else min(branch.inputs[-1] for branch in branches)
-        table = {}
-        for name in ("amplitudes", "frequencies"):
-            word = {"amplitudes": "amplitude", "frequencies": "frequency"}[name]
-            keys = (f"{word}_hysteresis", f"target_{word}_hysteresis", f"{word}_error")
-            if low >= high:
-                table.update(dict.fromkeys(keys, np.inf))
-                continue
-            grid = np.geomspace(low, high, GRID)
-            body = np.array([branch.at(name, grid) for branch in self.body])
-            target = np.array([branch.at(name, grid) for branch in self.target])
+        if any(len(branch.inputs) < 2 for branch in branches):
+            return {"inputs": None, **dict.fromkeys(NAMES, np.inf)}
+        low = max(lowest, *(branch.inputs[0] for branch in branches))
+        high = min(branch.inputs[-1] for branch in branches)
+        if low >= high:
+            return {"inputs": None, **dict.fromkeys(NAMES, np.inf)}
+        grid = np.geomspace(low, high, GRID)
+        values: list[float] = []
+        for quantity in ("amplitudes", "frequencies"):
+            body = np.array([branch.at(quantity, grid) for branch in self.body])
+            target = np.array([branch.at(quantity, grid) for branch in self.target])
             scale = target.mean(axis=0)
-            values = (
-                np.abs(body[0] - body[1]) / scale,
-                np.abs(target[0] - target[1]) / scale,
-                np.abs(body / target - 1.0),
-            )
-            table.update({key: float(v.max()) for key, v in zip(keys, values, strict=True)})
-        return table
+            apart = ((body[1] - body[0]) / scale, (target[1] - target[0]) / scale)
+            values += [float(np.abs(d).max()) for d in (*apart, body / target - 1.0)]
+        return {"inputs": (float(low), float(high)), **dict(zip(NAMES, values, strict=True))}
 
 
 def branches(profile: Profile, values: Array, timestep: float) -> tuple[Branch, Branch]:
