@@ -96,6 +96,25 @@ def test_teaching_is_the_regression_over_the_course(result):
     assert np.abs(held.outputs - result.first.held[1.2].outputs).max() < 1e-9
 
 
+def test_small_cycles_count_more_by_their_radius():
+    """Rows divided by r^1.5: squared errors by r^3."""
+    config = replace(QUICK, size_weight=1.5)
+    sizes = input_driven.SYSTEM.sizes(1.0, 2.0)
+    weights = config.row_weight(sizes)(np.array([0.0, 12.5, 25.0]))
+    radii = [metrics.rms_radius(quadratic(u).orbit(4096)) for u in (1.0, 1.5, 2.0)]
+    np.testing.assert_allclose(weights, np.array(radii) ** -3.0, rtol=1e-4)
+    fitted = input_driven.run(replace(config, curve=(), sweep=0.0)).first.w_out
+    body, course = draw_body(0, SMALL), QUICK.course
+    t = 1e-3 * np.arange(30_000)
+    clean = input_driven.SYSTEM.follow(course)(t)
+    noisy = clean + 0.3 * stream(0, "teacher_noise").standard_normal(clean.shape)
+    simulation = Simulation(body, engine="twin")
+    lengths = simulation.rollout(inputs=course(t)[:, None], offset=noisy, gate=0.0).lengths
+    scale = sizes(course(t))[5000::5, None] ** -1.5
+    w_out = fit_readout(scale * lengths[5000::5], scale * clean[5000::5])
+    assert np.abs(lengths @ (fitted - w_out)).max() < 1e-5
+
+
 def test_errors_are_what_their_names_say(result):
     for value, held in result.first.held.items():
         goal, last = quadratic(value), held.outputs[-9000:]

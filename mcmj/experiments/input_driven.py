@@ -1,6 +1,6 @@
 """Figs. 10 and 11: one body, one static readout; a constant input chooses the rhythm."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -22,10 +22,9 @@ from mcmj.rates import success_rate
 from mcmj.readout import Fit
 from mcmj.simulation import CHUNK, Simulation
 from mcmj.targets import Target
-from mcmj.teaching import Lesson, teach_lessons
+from mcmj.teaching import Lesson, Signal, teach_lessons
 from mcmj.validation import Array
 
-Signal = Callable[[Array], Array]
 LEAD_IN = 20.0  # s, onto the cycle from which a body with a readout, or a sweep, sets out
 
 
@@ -137,13 +136,12 @@ def run(config: Config, *, on_steps: OnSteps = lambda steps: None) -> Result:
         DivergenceError: the first body blew up under the teacher.
         BodyFileError, InvalidArgumentError, UnknownNameError: a body that cannot do the task.
     """
-    course = config.course
     start = get_start(config, config.seed)
     warn_outside(config, start.taught)
-    teacher = SYSTEM.follow(course) if start.w_out is None else None
-    first = _of_body(config, start, config.seed, teacher, config.all_inputs, on_steps)
+    lesson = _lesson(config) if start.w_out is None else None
+    first = _of_body(config, start, config.seed, lesson, config.all_inputs, on_steps)
     others = [
-        _of_other(config, seed, teacher, on_steps)
+        _of_other(config, seed, lesson, on_steps)
         for seed in range(config.seed + 1, config.seed + config.seeds)
     ]
     errors = {
@@ -153,16 +151,31 @@ def run(config: Config, *, on_steps: OnSteps = lambda steps: None) -> Result:
     return Result(config, first, errors)
 
 
+def _lesson(config: Config) -> Lesson:
+    """The course, with the target's way along it; the same for every body."""
+    course = config.course
+    weight: float | Signal = 1.0
+    if config.size_weight != 0:
+        weight = config.row_weight(SYSTEM.sizes(course.low, course.high))
+    return Lesson(
+        SYSTEM.follow(course),
+        course.duration,
+        config.run_in,
+        inputs=lambda times: course(times)[:, None],
+        weight=weight,
+    )
+
+
 def _of_body(
     config: Config,
     start: Start,
     seed: int,
-    teacher: Signal | None,
+    lesson: Lesson | None,
     inputs: Sequence[float],
     on_steps: OnSteps,
 ) -> BodyResult:
     simulation = Simulation(start.body, timestep=config.timestep, engine=config.engine)
-    fit = _ready(config, simulation, start, seed, teacher, on_steps)
+    fit = _ready(config, simulation, start, seed, lesson, on_steps)
     state = simulation.snapshot()
     held = {}
     for value in inputs:
@@ -178,10 +191,10 @@ def _of_body(
 
 
 def _of_other(
-    config: Config, seed: int, teacher: Signal | None, on_steps: OnSteps
+    config: Config, seed: int, lesson: Lesson | None, on_steps: OnSteps
 ) -> BodyResult | None:
     try:
-        return _of_body(config, get_start(config, seed), seed, teacher, config.inputs, on_steps)
+        return _of_body(config, get_start(config, seed), seed, lesson, config.inputs, on_steps)
     except DivergenceError:
         return None
 
@@ -191,19 +204,16 @@ def _ready(
     simulation: Simulation,
     start: Start,
     seed: int,
-    teacher: Signal | None,
+    lesson: Lesson | None,
     on_steps: OnSteps,
 ) -> Fit | None:
     """Teach, or bring a body that has its readout onto the cycle where teaching ended."""
-    course = config.course
-    if teacher is not None:
-        lesson = Lesson(
-            teacher, course.duration, config.run_in, inputs=lambda times: course(times)[:, None]
-        )
+    if lesson is not None:
         return teach_lessons(simulation, [lesson], config.teaching, seed, on_steps=on_steps)
     steps = round(LEAD_IN / config.timestep)
-    signal = SYSTEM.cycle(course.last).sample(config.timestep * np.arange(steps))
-    simulation.rollout(inputs=np.full((steps, 1), course.last), offset=signal, gate=0.0, record=())
+    last = config.course.last
+    signal = SYSTEM.cycle(last).sample(config.timestep * np.arange(steps))
+    simulation.rollout(inputs=np.full((steps, 1), last), offset=signal, gate=0.0, record=())
     simulation.set_readout(start.w_out)
     return None
 

@@ -1,7 +1,10 @@
 """What the input-driven experiment runs: its Config, and the body and readout it asks for."""
 
 import warnings
+from collections.abc import Callable
 from dataclasses import asdict, dataclass
+
+import numpy as np
 
 from mcmj.body import Body
 from mcmj.bodyfile import (
@@ -16,7 +19,7 @@ from mcmj.errors import InvalidArgumentError, McmjWarning, UnknownNameError
 from mcmj.generator import BodySettings, draw_body
 from mcmj.library import body_path
 from mcmj.profiles import Profile, Ramp, hold
-from mcmj.teaching import Teaching
+from mcmj.teaching import Signal, Teaching
 from mcmj.validation import Array, require_count, require_number
 
 SYSTEM = QUADRATIC
@@ -24,7 +27,7 @@ PROFILES = {
     "ramp": "lin 0.1 5 200",  # the paper's
     "mixed": "log 0.1 5 240, log 5 0.1 200, hold 0.1 20, log 0.1 5 240, hold 5 100",
 }
-DRAWN = BodySettings(nodes=100, n_inputs=1, input_scale=2.0, feedback_fraction=0.5)
+DRAWN = BodySettings(nodes=100, n_inputs=1, input_scale=2.0, feedback_fraction=1.0)
 
 
 @dataclass(frozen=True)
@@ -48,6 +51,8 @@ class Config:
             of that back up [s]; 0: none.
         tolerance: largest orbit error of a success.
         noise: standard deviation of the white noise on the fed-back teacher.
+        size_weight: rows of the regression are divided by r^size_weight, r the RMS radius of
+            the limit cycle at their input: above 0 small cycles count more.
         ridge_per_row: see Teaching.
         every: see Teaching.
         timestep: control and physics step [s].
@@ -68,6 +73,7 @@ class Config:
     sweep: float = 400.0
     tolerance: float = 0.05
     noise: float = 0.4
+    size_weight: float = 0.0
     ridge_per_row: float = 0.0
     every: int = 10
     timestep: float = 1e-3
@@ -84,6 +90,7 @@ class Config:
         require_number("window", self.window, 0.0, self.free_run, open_low=True)
         if not self.inputs:
             raise InvalidArgumentError("inputs", "at least one", self.inputs)
+        require_number("size_weight", self.size_weight, -np.inf)
         for name in ("inputs", "curve"):
             for value in getattr(self, name):
                 require_number(name, value, 0.0, open_low=True)
@@ -112,6 +119,11 @@ class Config:
             ridge_per_row=self.ridge_per_row,
             every=self.every,
         )
+
+    def row_weight(self, sizes: Callable[[Array], Array]) -> Signal:
+        """Of the squared errors: times (T,) -> r(u(t))^(-2 size_weight), from sizes r(u)."""
+        course = self.course
+        return lambda times: sizes(course(times)) ** (-2.0 * self.size_weight)
 
     @property
     def all_inputs(self) -> list[float]:
