@@ -1,6 +1,10 @@
 """Rhythms chosen by an input: cycles of a signal, the sweep, the experiment, what is refused."""
 
+import json
+import subprocess
+import sys
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -226,3 +230,32 @@ def test_the_general_body_has_no_input():
 def test_a_window_must_hold_a_period_of_every_input():
     with pytest.raises(InvalidArgumentError, match=r"window: expected at least 6\.664 s"):
         input_driven.run(replace(QUICK, window=2.0))
+
+
+def test_script_writes_everything(tmp_path):
+    options = [
+        "--engine", "twin", "--nodes", "15", "--profile", "lin 1 2 10, hold 2 10", "--run-in", "5",
+        "--inputs", "2", "1", "--curve", "1.4", "--free-run", "10", "--window", "8",
+        "--sweep", "20", "--seeds", "2", "--out", tmp_path,
+    ]  # fmt: skip
+    script = Path(mcmj.__file__).parent.parent / "scripts" / "input_driven.py"
+    process = subprocess.run(
+        [sys.executable, script, *map(str, options)], capture_output=True, text=True, check=False
+    )
+    assert process.returncode == 0, process.stderr
+    assert "input all_inputs: " in process.stdout
+    document = json.loads((tmp_path / "metrics.json").read_text())
+    assert document["scenario"] == "input_driven"
+    for value in ("2", "1", "1.4"):
+        assert {"orbit_error", "amplitude_error", "frequency_error"} <= set(
+            document["metrics"]["eps"][value]
+        )
+    assert document["metrics"]["rates"]["all_inputs"]["of"] == 2
+    for name in ("input_curves.png", "input_jumps.png"):
+        assert (tmp_path / name).stat().st_size > 10_000
+    with np.load(tmp_path / "trajectory.npz", allow_pickle=False) as arrays:
+        assert arrays["eps_1/outputs"].shape == (10_000, 2)
+    start = get_start(Config(body=str(tmp_path / "body.xml")), 0)
+    assert start.w_out is not None
+    assert start.taught == (1.0, 2.0)
+    assert start.body == draw_body(0, replace(Config().settings, nodes=15))

@@ -20,7 +20,7 @@ from mcmj.profiles import Profile, hold
 from mcmj.progress import OnSteps
 from mcmj.rates import success_rate
 from mcmj.readout import Fit
-from mcmj.simulation import CHUNK, Simulation
+from mcmj.simulation import Simulation
 from mcmj.targets import Target
 from mcmj.teaching import Lesson, Signal, teach_lessons
 from mcmj.validation import Array
@@ -79,7 +79,7 @@ class BodyResult:
 
 @dataclass(frozen=True)
 class Result:
-    """All bodies (None: blew up under the teacher); the first is drawn."""
+    """The first body, which is drawn, and the orbit errors (seeds,) of all by input."""
 
     config: Config
     first: BodyResult
@@ -138,17 +138,15 @@ def run(config: Config, *, on_steps: OnSteps = lambda steps: None) -> Result:
     """
     start = get_start(config, config.seed)
     warn_outside(config, start.taught)
+    for value in config.all_inputs:
+        _check_window(config, SYSTEM.cycle(value))
     lesson = _lesson(config) if start.w_out is None else None
-    first = _of_body(config, start, config.seed, lesson, config.all_inputs, on_steps)
-    others = [
-        _of_other(config, seed, lesson, on_steps)
-        for seed in range(config.seed + 1, config.seed + config.seeds)
-    ]
-    errors = {
-        u: np.array([np.inf if b is None else b.held[u].orbit_error for b in [first, *others]])
-        for u in config.inputs
-    }
-    return Result(config, first, errors)
+    first = _of_first(config, start, lesson, on_steps)
+    errors = {u: [first.held[u].orbit_error] for u in config.inputs}
+    for seed in range(config.seed + 1, config.seed + config.seeds):
+        for value, error in _errors_of_seed(config, seed, lesson, on_steps).items():
+            errors[value].append(error)
+    return Result(config, first, {u: np.array(e) for u, e in errors.items()})
 
 
 def _lesson(config: Config) -> Lesson:
@@ -166,66 +164,71 @@ def _lesson(config: Config) -> Lesson:
     )
 
 
-def _of_body(
-    config: Config,
-    start: Start,
-    seed: int,
-    lesson: Lesson | None,
-    inputs: Sequence[float],
-    on_steps: OnSteps,
-) -> BodyResult:
+def _of_first(config: Config, start: Start, lesson: Lesson | None, on_steps: OnSteps) -> BodyResult:
     simulation = Simulation(start.body, timestep=config.timestep, engine=config.engine)
-    fit = _ready(config, simulation, start, seed, lesson, on_steps)
+    if lesson is None:
+        fit = None
+        _lead_in(config, simulation)
+        simulation.set_readout(start.w_out)
+    else:
+        fit = teach_lessons(simulation, [lesson], config.teaching, config.seed, on_steps=on_steps)
+    w_out, state = simulation.w_out, simulation.snapshot()
+    assert w_out is not None
+    held = _jump(config, simulation, config.all_inputs, on_steps)
+    sweep = None
+    if config.sweep > 0:
+        simulation.restore(state)
+        sweep = _sweep(config, simulation, start.taught, on_steps)
+    return BodyResult(start, w_out, fit, held, sweep)
+
+
+def _errors_of_seed(
+    config: Config, seed: int, lesson: Lesson | None, on_steps: OnSteps
+) -> dict[float, float]:
+    """Orbit errors of a random body; infinite if it blew up under the teacher."""
+    assert lesson is not None
+    body = get_start(config, seed).body
+    simulation = Simulation(body, timestep=config.timestep, engine=config.engine)
+    try:
+        teach_lessons(simulation, [lesson], config.teaching, seed, on_steps=on_steps)
+    except DivergenceError:
+        return dict.fromkeys(config.inputs, np.inf)
+    held = _jump(config, simulation, config.inputs, on_steps)
+    return {value: run.orbit_error for value, run in held.items()}
+
+
+def _lead_in(config: Config, simulation: Simulation) -> None:
+    """Bring a body that has its readout onto the cycle where teaching ended, by its target."""
+    times = config.timestep * np.arange(round(LEAD_IN / config.timestep))
+    last = config.course.last
+    simulation.rollout(
+        inputs=np.full((len(times), 1), last),
+        offset=SYSTEM.cycle(last).sample(times),
+        gate=0.0,
+        record=(),
+    )
+
+
+def _jump(
+    config: Config, simulation: Simulation, inputs: Sequence[float], on_steps: OnSteps
+) -> dict[float, Held]:
+    """The closed loop at each constant input, always from the simulation's state now."""
     state = simulation.snapshot()
     held = {}
     for value in inputs:
         simulation.restore(state)
-        held[value] = _hold(config, simulation, value, on_steps)
-    sweep = None
-    if config.sweep > 0 and len(inputs) == len(config.all_inputs):
-        simulation.restore(state)
-        sweep = _sweep(config, simulation, start.taught, on_steps)
-    w_out = simulation.w_out
-    assert w_out is not None
-    return BodyResult(start, w_out, fit, held, sweep)
+        try:
+            outputs = drive(simulation, Profile([hold(value, config.free_run)]), on_steps)
+        except DivergenceError:
+            outputs = np.zeros((0, 2))
+        held[value] = measure(config, SYSTEM.cycle(value), outputs)
+    return held
 
 
-def _of_other(
-    config: Config, seed: int, lesson: Lesson | None, on_steps: OnSteps
-) -> BodyResult | None:
-    try:
-        return _of_body(config, get_start(config, seed), seed, lesson, config.inputs, on_steps)
-    except DivergenceError:
-        return None
-
-
-def _ready(
-    config: Config,
-    simulation: Simulation,
-    start: Start,
-    seed: int,
-    lesson: Lesson | None,
-    on_steps: OnSteps,
-) -> Fit | None:
-    """Teach, or bring a body that has its readout onto the cycle where teaching ended."""
-    if lesson is not None:
-        return teach_lessons(simulation, [lesson], config.teaching, seed, on_steps=on_steps)
-    steps = round(LEAD_IN / config.timestep)
-    last = config.course.last
-    signal = SYSTEM.cycle(last).sample(config.timestep * np.arange(steps))
-    simulation.rollout(inputs=np.full((steps, 1), last), offset=signal, gate=0.0, record=())
-    simulation.set_readout(start.w_out)
-    return None
-
-
-def _hold(config: Config, simulation: Simulation, value: float, on_steps: OnSteps) -> Held:
-    """The closed loop from the simulation's state, at a constant input."""
-    target = SYSTEM.cycle(value)
-    check_window(config, target)
-    try:
-        outputs = drive(simulation, Profile([hold(value, config.free_run)]), on_steps)
-    except DivergenceError:
-        return Held(target, np.zeros((0, 2)))
+def measure(config: Config, target: Target, outputs: Array) -> Held:
+    """What the last part of the outputs (T, n_outputs) at a constant input is worth."""
+    if len(outputs) == 0:
+        return Held(target, outputs)
     last = outputs[-round(config.window / config.timestep) :]
     moves = np.ptp(last, axis=0).max() > 1e-9
     period = metrics.period(last, config.timestep, target.period) if moves else np.nan
@@ -243,12 +246,16 @@ def _hold(config: Config, simulation: Simulation, value: float, on_steps: OnStep
 def _sweep(
     config: Config, simulation: Simulation, taught: tuple[float, float], on_steps: OnSteps
 ) -> Sweep:
-    """From the simulation's state: lead-in at the largest input, then down and up again."""
+    """From the simulation's state: some time at the largest input, then down and up again."""
     profile = sweep_profile(config, taught)
-    drive(simulation, Profile([hold(profile.ramps[0].start, LEAD_IN)]), on_steps)
     step = config.timestep
-    outputs = drive(simulation, profile, on_steps)
-    wanted = SYSTEM.follow(profile)(step * np.arange(len(outputs), dtype=np.float64))
+    times = step * np.arange(round(profile.duration / step), dtype=np.float64)
+    try:
+        drive(simulation, Profile([hold(profile.ramps[0].start, LEAD_IN)]), on_steps)
+        outputs = drive(simulation, profile, on_steps)
+    except DivergenceError:
+        outputs = np.zeros((len(times), 2))  # no cycles: the rhythm was lost
+    wanted = SYSTEM.follow(profile)(times)
     return Sweep(*(branches(profile, signal[:, 0], step) for signal in (outputs, wanted)))
 
 
@@ -258,18 +265,16 @@ def drive(simulation: Simulation, profile: Profile, on_steps: OnSteps) -> Array:
     Raises:
         DivergenceError: the body blew up.
     """
-    total = round(profile.duration / simulation.timestep)
+    steps = np.arange(round(profile.duration / simulation.timestep))
+    inputs = profile(simulation.timestep * steps)[:, None]
     parts = []
-    for start in range(0, total, CHUNK):
-        steps = np.arange(start, min(start + CHUNK, total))
-        inputs = profile(simulation.timestep * steps)[:, None]
-        parts.append(simulation.rollout(inputs=inputs, record=("outputs",)).get("outputs"))
-        on_steps(len(steps))
+    for part in simulation.stream(inputs=inputs, record=("outputs",)):
+        parts.append(part.get("outputs"))
+        on_steps(len(part))
     return np.concatenate(parts)
 
 
-def check_window(config: Config, target: Target) -> None:
-    """Raise unless the window is long enough to measure a target's period."""
+def _check_window(config: Config, target: Target) -> None:
     needed = metrics.PERIODS_NEEDED * target.period
     if config.window < needed:
         raise InvalidArgumentError(
