@@ -5,13 +5,11 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
-from scipy.interpolate import PchipInterpolator
 
 from mcmj.errors import InvalidArgumentError
-from mcmj.metrics import ORBIT_POINTS, rms_radius
 from mcmj.profiles import Profile
 from mcmj.targets import Target, integrate, quadratic, quadratic_flow
-from mcmj.validation import Array, require_number
+from mcmj.validation import Array
 
 
 @dataclass(frozen=True)
@@ -53,25 +51,6 @@ class DrivenSystem:
             pieces.append(solution.sol)
             start = solution.y[:, -1]
         return functools.partial(_sample, profile, pieces, len(start))
-
-    def sizes(self, low: float, high: float, *, points: int = 12) -> Callable[[Array], Array]:
-        """RMS radius of the limit cycle against the input, by a monotone cubic in the logarithms.
-
-        Args:
-            low, high: range of the inputs, positive.
-            points: exact cycles in it, in equal ratios.
-
-        Returns:
-            Inputs (T,) -> (T,).
-        """
-        require_number("low", low, 0.0, high, open_low=True)
-        if low == high:
-            size = rms_radius(self.cycle(low).orbit(ORBIT_POINTS))
-            return lambda inputs: np.full(np.shape(inputs), size)
-        knots = np.geomspace(low, high, points)
-        radii = [rms_radius(self.cycle(float(u)).orbit(ORBIT_POINTS)) for u in knots]
-        curve = PchipInterpolator(np.log(knots), np.log(radii))
-        return lambda inputs: np.exp(curve(np.log(inputs)))
 
 
 def _sample(

@@ -34,18 +34,17 @@ def work(config: Config, output: Output, out: Path) -> None:
 
 
 def body_file(result: Result) -> str:
-    """MJCF of the first body with its readout and the range of inputs it was taught with."""
-    first, config = result.first, result.config
+    """MJCF of the first body: its readouts, and what each was taught with."""
+    first, config, start = result.first, result.config, result.first.start
+    lessons = dict(start.lessons)
+    if first.fit is not None:
+        lessons[config.readout_name] = store.plain(config)
     return to_mjcf(
-        first.start.body,
+        start.body,
         timestep=config.timestep,
         w_out=first.w_out,
-        readouts={config.readout or "input_driven": first.w_out},
-        provenance={
-            "body": first.start.source,
-            "config": store.plain(config),
-            "taught_inputs": list(first.start.taught),
-        },
+        readouts={**start.readouts, config.readout_name: first.w_out},
+        provenance={"body": start.source, "taught_inputs": start.taught, "lessons": lessons},
     )
 
 

@@ -84,16 +84,6 @@ def test_point_symmetry():
     assert np.abs(there + back).max() < 1e-12
 
 
-def test_sizes_are_the_cycles_radii():
-    sizes = HOPF.sizes(0.5, 8.0, points=9)
-    inputs = np.geomspace(0.5, 8.0, 40)
-    np.testing.assert_allclose(sizes(inputs), np.sqrt(inputs), rtol=1e-6)
-    assert HOPF.sizes(2.0, 2.0)(np.full(3, 2.0)) == pytest.approx(np.full(3, np.sqrt(2.0)))
-    found = QUADRATIC.sizes(0.5, 2.0, points=5)([0.8])
-    exact = rms_radius(quadratic(0.8).orbit(ORBIT_POINTS))
-    assert found == pytest.approx([exact], rel=2e-4)
-
-
 def test_times_outside_are_refused():
     goal = HOPF.follow(Profile([hold(1.0, 2.0)]))
     with pytest.raises(InvalidArgumentError, match=r"expected times from 0 to 2 s, got 2\.1"):

@@ -22,6 +22,7 @@ from mcmj.rhythm import cycles
 from mcmj.simulation import Simulation
 from mcmj.streams import stream
 from mcmj.targets import quadratic
+from mcmj.teaching import Lesson, Teaching, teach_lessons
 
 SMALL = BodySettings(nodes=20, n_inputs=1, input_scale=2.0, feedback_fraction=1.0)
 QUICK = Config(
@@ -100,23 +101,24 @@ def test_teaching_is_the_regression_over_the_course(result):
     assert np.abs(held.outputs - result.first.held[1.2].outputs).max() < 1e-9
 
 
-def test_small_cycles_count_more_by_their_radius():
-    """Rows divided by r^1.5: squared errors by r^3."""
-    config = replace(QUICK, size_weight=1.5)
-    sizes = input_driven.SYSTEM.sizes(1.0, 2.0)
-    weights = config.row_weight(sizes)(np.array([0.0, 12.5, 25.0]))
-    radii = [metrics.rms_radius(quadratic(u).orbit(4096)) for u in (1.0, 1.5, 2.0)]
-    np.testing.assert_allclose(weights, np.array(radii) ** -3.0, rtol=1e-4)
-    fitted = input_driven.run(replace(config, curve=(), sweep=0.0)).first.w_out
-    body, course = draw_body(0, SMALL), QUICK.course
-    t = 1e-3 * np.arange(30_000)
+def test_a_lesson_s_weight_is_that_of_the_squared_errors():
+    body, course, step = draw_body(0, replace(SMALL, nodes=8)), Profile.parse("lin 1 2 4"), 1e-3
+    t = step * np.arange(4000)
     clean = input_driven.SYSTEM.follow(course)(t)
-    noisy = clean + 0.3 * stream(0, "teacher_noise").standard_normal(clean.shape)
+    lesson = Lesson(
+        lambda times: clean[np.rint(times / step).astype(int)], 4.0, 1.0,
+        inputs=lambda times: course(times)[:, None], weight=lambda times: course(times) ** 3,
+    )  # fmt: skip
     simulation = Simulation(body, engine="twin")
-    lengths = simulation.rollout(inputs=course(t)[:, None], offset=noisy, gate=0.0).lengths
-    scale = sizes(course(t))[5000::5, None] ** -1.5
-    w_out = fit_readout(scale * lengths[5000::5], scale * clean[5000::5])
-    assert np.abs(lengths @ (fitted - w_out)).max() < 1e-5
+    lengths = simulation.rollout(inputs=course(t)[:, None], offset=clean, gate=0.0).lengths
+    simulation.reset()
+    fit = teach_lessons(simulation, [lesson], Teaching(noise=0.0, every=3), 0)
+    rows = np.arange(1000, 4000)
+    rows = rows[rows % 3 == 0]
+    scale = course(t)[rows, None] ** 1.5
+    w_out = fit_readout(scale * lengths[rows], scale * clean[rows])
+    assert fit.rows == len(rows)
+    assert np.abs(lengths @ (fit.w_out - w_out)).max() < 1e-6
 
 
 def test_errors_are_what_their_names_say(result):
@@ -198,6 +200,7 @@ def test_inputs_outside_the_taught_range_warn():
         ({"inputs": (1.0, -1.0)}, "inputs: expected a number in"),
         ({"window": 90.0}, "window: expected a number in"),
         ({"readout": "mine"}, "readout: expected a body file that holds it"),
+        ({"body": "b.xml", "readout": "mine", "teach": True}, "readout: expected none of the file"),
         ({"body": "general", "seeds": 2}, "body: expected no settings or seeds beside it"),
         ({"every": 0}, "every: expected an integer >= 1"),
         ({"noise": -1.0}, "noise: expected a number"),
@@ -259,3 +262,7 @@ def test_script_writes_everything(tmp_path):
     assert start.w_out is not None
     assert start.taught == (1.0, 2.0)
     assert start.body == draw_body(0, replace(Config().settings, nodes=15))
+    assert set(start.readouts) == set(start.lessons) == {"custom"}
+    again = get_start(Config(body=str(tmp_path / "body.xml"), teach=True), 0)
+    assert again.w_out is None
+    assert again.taught == (0.1, 5.0)

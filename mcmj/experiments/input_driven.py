@@ -22,7 +22,7 @@ from mcmj.rates import success_rate
 from mcmj.readout import Fit
 from mcmj.simulation import Simulation
 from mcmj.targets import Target
-from mcmj.teaching import Lesson, Signal, teach_lessons
+from mcmj.teaching import Lesson, teach_lessons
 from mcmj.validation import Array
 
 LEAD_IN = 20.0  # s, onto the cycle from which a body with a readout, or a sweep, sets out
@@ -152,15 +152,11 @@ def run(config: Config, *, on_steps: OnSteps = lambda steps: None) -> Result:
 def _lesson(config: Config) -> Lesson:
     """The course, with the target's way along it; the same for every body."""
     course = config.course
-    weight: float | Signal = 1.0
-    if config.size_weight != 0:
-        weight = config.row_weight(SYSTEM.sizes(course.low, course.high))
     return Lesson(
         SYSTEM.follow(course),
         course.duration,
         config.run_in,
         inputs=lambda times: course(times)[:, None],
-        weight=weight,
     )
 
 

@@ -1,10 +1,8 @@
 """What the input-driven experiment runs: its Config, and the body and readout it asks for."""
 
 import warnings
-from collections.abc import Callable
 from dataclasses import asdict, dataclass
-
-import numpy as np
+from typing import Any
 
 from mcmj.body import Body
 from mcmj.bodyfile import (
@@ -19,7 +17,7 @@ from mcmj.errors import InvalidArgumentError, McmjWarning, UnknownNameError
 from mcmj.generator import BodySettings, draw_body
 from mcmj.library import body_path
 from mcmj.profiles import Profile, Ramp, hold
-from mcmj.teaching import Signal, Teaching
+from mcmj.teaching import Teaching
 from mcmj.validation import Array, require_count, require_number
 
 SYSTEM = QUADRATIC
@@ -27,7 +25,9 @@ PROFILES = {
     "ramp": "lin 0.1 5 200",  # the paper's
     "mixed": "log 0.1 5 240, log 5 0.1 200, hold 0.1 20, log 0.1 5 240, hold 5 100",
 }
-DRAWN = BodySettings(nodes=100, n_inputs=1, input_scale=2.0, feedback_fraction=1.0)
+DRAWN = BodySettings(
+    nodes=100, n_inputs=1, input_fraction=0.5, input_scale=3.0, feedback_fraction=1.0
+)
 
 
 @dataclass(frozen=True)
@@ -38,6 +38,7 @@ class Config:
         body: a body file, or the name of a body that comes with mcmj; default: a random body.
             If the file holds a readout, nothing is taught.
         readout: name of one of the file's readouts; default: the one it runs.
+        teach: teach a body file anew; body.xml then holds its old readouts too.
         seed: of the random body and the noise.
         seeds: number of random bodies of consecutive seeds, for rates.
         profile: input during teaching: ramp, mixed, or your own, such as
@@ -51,8 +52,6 @@ class Config:
             of that back up [s]; 0: none.
         tolerance: largest orbit error of a success.
         noise: standard deviation of the white noise on the fed-back teacher.
-        size_weight: rows of the regression are divided by r^size_weight, r the RMS radius of
-            the limit cycle at their input: above 0 small cycles count more.
         ridge_per_row: see Teaching.
         every: see Teaching.
         timestep: control and physics step [s].
@@ -62,6 +61,7 @@ class Config:
 
     body: str | None = None
     readout: str | None = None
+    teach: bool = False
     seed: int = 0
     seeds: int = 1
     profile: str = "mixed"
@@ -73,7 +73,6 @@ class Config:
     sweep: float = 400.0
     tolerance: float = 0.05
     noise: float = 0.4
-    size_weight: float = 0.0
     ridge_per_row: float = 0.0
     every: int = 10
     timestep: float = 1e-3
@@ -90,7 +89,6 @@ class Config:
         require_number("window", self.window, 0.0, self.free_run, open_low=True)
         if not self.inputs:
             raise InvalidArgumentError("inputs", "at least one", self.inputs)
-        require_number("size_weight", self.size_weight, -np.inf)
         for name in ("inputs", "curve"):
             for value in getattr(self, name):
                 require_number(name, value, 0.0, open_low=True)
@@ -98,7 +96,16 @@ class Config:
             raise InvalidArgumentError("body", "no settings or seeds beside it", self.body)
         if self.readout is not None and self.body is None:
             raise InvalidArgumentError("readout", "a body file that holds it", self.readout)
+        if self.readout is not None and self.teach:
+            raise InvalidArgumentError(
+                "readout", "none of the file's where one is taught", self.readout
+            )
         self.teaching  # noqa: B018  checks the rest
+
+    @property
+    def readout_name(self) -> str:
+        """Of the readout that is run, in body.xml."""
+        return self.readout or (self.profile if self.profile in PROFILES else "custom")
 
     @property
     def course(self) -> Profile:
@@ -120,11 +127,6 @@ class Config:
             every=self.every,
         )
 
-    def row_weight(self, sizes: Callable[[Array], Array]) -> Signal:
-        """Of the squared errors: times (T,) -> r(u(t))^(-2 size_weight), from sizes r(u)."""
-        course = self.course
-        return lambda times: sizes(course(times)) ** (-2.0 * self.size_weight)
-
     @property
     def all_inputs(self) -> list[float]:
         """Inputs to jump to and those of the curve, in ascending order."""
@@ -138,13 +140,17 @@ class Start:
     Attributes:
         w_out: readout that came with it; None: to be taught.
         taught: smallest and largest input it is or was taught with.
-        source: where it comes from.
+        readouts: all that the file holds, by name.
+        source: where the body comes from.
+        lessons: what each of the readouts was taught with, by name.
     """
 
     body: Body
     w_out: Array | None
     taught: tuple[float, float]
+    readouts: dict[str, Array]
     source: dict[str, object]
+    lessons: dict[str, object]
 
 
 def get_start(config: Config, seed: int) -> Start:
@@ -159,20 +165,25 @@ def get_start(config: Config, seed: int) -> Start:
     if config.body is None:
         body = draw_body(seed, config.settings)
         check_channels(body)
-        return Start(body, None, taught, {"seed": seed, "settings": asdict(config.settings)})
+        source = {"seed": seed, "settings": asdict(config.settings)}
+        return Start(body, None, taught, {}, source, {})
     model = load_model(body_path(config.body))
     body, readouts = body_of_model(model), readouts_of_model(model)
     check_channels(body)
-    w_out = readout_of_model(model)
-    if config.readout is not None:
-        if config.readout not in readouts:
-            raise UnknownNameError("readout of the body file", config.readout, readouts)
-        w_out = readouts[config.readout]
-    source = provenance_of_model(model) or {}
-    if w_out is not None and "taught_inputs" in source:
-        low, high = (float(u) for u in source["taught_inputs"])  # type: ignore[attr-defined]
-        taught = (low, high)
-    return Start(body, w_out, taught, source)
+    account: dict[str, Any] = provenance_of_model(model) or {}
+    w_out = None if config.teach else _readout(config.readout, readout_of_model(model), readouts)
+    if w_out is not None:
+        taught = tuple(account.get("taught_inputs", taught))
+    source, lessons = account.get("body", account), account.get("lessons", {})
+    return Start(body, w_out, taught, readouts, source, lessons)
+
+
+def _readout(name: str | None, active: Array | None, readouts: dict[str, Array]) -> Array | None:
+    if name is None:
+        return active
+    if name not in readouts:
+        raise UnknownNameError("readout of the body file", name, readouts)
+    return readouts[name]
 
 
 def check_channels(body: Body) -> None:
