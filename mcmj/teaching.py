@@ -110,6 +110,13 @@ class Lesson:
         """Whether it begins where the simulation is not."""
         return self.from_rest or self.start is not None
 
+    def begin(self, simulation: Simulation) -> None:
+        """Put a simulation where the lesson begins."""
+        if self.from_rest:
+            simulation.reset()
+        if self.start is not None:
+            simulation.restore(self.start)
+
 
 def teach(
     simulation: Simulation,
@@ -213,10 +220,7 @@ class Course:
         if lesson.own_share > 0 and self.simulation.w_out is None:
             raise InvalidArgumentError("own_share", "0 before the first fit", lesson.own_share)
         before = self.simulation.snapshot()
-        if lesson.from_rest:
-            self.simulation.reset()
-        if lesson.start is not None:
-            self.simulation.restore(lesson.start)
+        lesson.begin(self.simulation)
         learnt = copy(self._regression)
         try:
             self._follow(lesson, learnt, on_steps)

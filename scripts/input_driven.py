@@ -37,7 +37,7 @@ def body_file(result: Result) -> str:
     """MJCF of the first body: its readouts, and what each was taught with."""
     first, config, start = result.first, result.config, result.first.start
     lessons = dict(start.lessons)
-    if first.fit is not None:
+    if first.practised is not None:
         lessons[config.readout_name] = store.plain(config)
     return to_mjcf(
         start.body,

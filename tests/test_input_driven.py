@@ -11,11 +11,13 @@ import pytest
 
 import mcmj
 from mcmj import metrics
+from mcmj.driven import DrivenSystem
 from mcmj.errors import DivergenceError, InvalidArgumentError, McmjWarning, UnknownNameError
-from mcmj.experiments import input_driven
+from mcmj.experiments import input_driven, input_lessons
 from mcmj.experiments.input_driven_config import Config, get_start
 from mcmj.experiments.input_sweep import Branch, Sweep, branches
 from mcmj.generator import BodySettings, draw_body
+from mcmj.practice import Practice
 from mcmj.profiles import Profile
 from mcmj.readout import fit_readout
 from mcmj.rhythm import cycles
@@ -28,6 +30,7 @@ SMALL = BodySettings(nodes=20, n_inputs=1, input_scale=2.0, feedback_fraction=1.
 QUICK = Config(
     profile="lin 1 2 15, hold 2 10", run_in=5.0, inputs=(2.0, 1.2), curve=(1.0,), free_run=16.0,
     window=9.0, sweep=15.0, every=5, noise=0.3, engine="twin", settings=SMALL,
+    practice=Practice(rounds=0, round_duration=20.0, trial=12.0, trial_window=9.0),
 )  # fmt: skip
 
 
@@ -144,6 +147,38 @@ def test_the_input_changes_the_rhythm_the_right_way(result):
     assert held[1.0].amplitude > held[1.2].amplitude > held[2.0].amplitude
 
 
+def test_practice_of_the_jumps_that_it_misses_helps():
+    practice = replace(QUICK.practice, rounds=2, round_runs=1, trial=16.0, good_enough=0.03)
+    found = input_driven.run(replace(QUICK, practice=practice, curve=(), sweep=0.0))
+    errors = found.metrics["practice_errors"]
+    assert len(errors) == 3
+    assert errors[0] > 0.05 > min(errors)
+    worst = max(held.orbit_error for held in found.first.held.values())
+    assert worst == pytest.approx(min(errors), rel=1e-9)  # the sums go in other chunks
+
+
+def test_a_jump_is_practised_from_where_the_course_ends():
+    """The target goes on from its state then, under the constant input."""
+    heard = []
+
+    class Recorded(DrivenSystem):
+        def follow(self, profile, start=None):
+            heard.append((str(profile), start))
+            return super().follow(profile, start)
+
+    system = Recorded(**vars(input_driven.SYSTEM))
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(input_lessons, "SYSTEM", system)
+        lesson = input_lessons.course_lesson(QUICK)
+        simulation = Simulation(draw_body(0, SMALL), engine="twin")
+        input_lessons.teach(QUICK, simulation, lesson, 0, lambda steps: None)
+    end = lesson.outputs(np.array([30.0]))[0]
+    assert [profile for profile, _ in heard[1:]] == ["hold 2.0 20.0", "hold 1.2 20.0"]
+    for _, start in heard[1:]:
+        np.testing.assert_array_equal(start, end)
+    assert simulation.time == pytest.approx(30.0)
+
+
 def test_rates_over_seeds_and_same_seed_same_bits(result):
     config = replace(QUICK, seeds=2, curve=(), sweep=0.0)
     again = input_driven.run(config)
@@ -162,7 +197,7 @@ def test_a_body_that_blows_up_is_a_failure(result, monkeypatch):
     monkeypatch.setattr(input_driven, "drive", blow_up)
     found = input_driven.run(replace(QUICK, sweep=0.0))
     assert found.metrics["eps"]["2"]["orbit_error"] == np.inf
-    monkeypatch.setattr(input_driven, "teach_lessons", blow_up)
+    monkeypatch.setattr(input_driven, "teach", blow_up)
     with pytest.raises(DivergenceError):
         input_driven.run(QUICK)
 
@@ -176,7 +211,7 @@ def test_a_body_file_with_its_readout_is_not_taught_again(result, tmp_path):
     path.write_text(text)
     config = replace(QUICK, settings=Config().settings, body=str(path), readout="mine")
     loaded = input_driven.run(config)
-    assert loaded.first.fit is None
+    assert loaded.first.practised is None
     assert loaded.first.start.body == body
     for value, held in loaded.first.held.items():  # the same rhythms from another start
         assert held.frequency == pytest.approx(result.first.held[value].frequency, rel=0.01)
@@ -239,7 +274,8 @@ def test_script_writes_everything(tmp_path):
     options = [
         "--engine", "twin", "--nodes", "15", "--profile", "lin 1 2 10, hold 2 10", "--run-in", "5",
         "--inputs", "2", "1", "--curve", "1.4", "--free-run", "10", "--window", "8",
-        "--sweep", "20", "--seeds", "2", "--out", tmp_path,
+        "--sweep", "20", "--seeds", "2", "--rounds", "1", "--trial", "10", "--trial-window", "8",
+        "--round-duration", "5", "--out", tmp_path,
     ]  # fmt: skip
     script = Path(mcmj.__file__).parent.parent / "scripts" / "input_driven.py"
     process = subprocess.run(

@@ -1,6 +1,6 @@
 """Figs. 10 and 11: one body, one static readout; a constant input chooses the rhythm."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,14 +15,15 @@ from mcmj.experiments.input_driven_config import (
     sweep_profile,
     warn_outside,
 )
+from mcmj.experiments.input_lessons import course_lesson, teach
 from mcmj.experiments.input_sweep import Sweep, branches
+from mcmj.practice import Practised
 from mcmj.profiles import Profile, hold
 from mcmj.progress import OnSteps
 from mcmj.rates import success_rate
-from mcmj.readout import Fit
 from mcmj.simulation import Simulation
 from mcmj.targets import Target
-from mcmj.teaching import Lesson, teach_lessons
+from mcmj.teaching import Lesson
 from mcmj.validation import Array
 
 LEAD_IN = 20.0  # s, onto the cycle from which a body with a readout, or a sweep, sets out
@@ -68,33 +69,49 @@ class Held:
 
 @dataclass(frozen=True)
 class BodyResult:
-    """One body: `fit` is None if its readout came with the file; `held` is by input."""
+    """One body: `practised` is None if its readout came with the file; `held` is by input."""
 
     start: Start
     w_out: Array
-    fit: Fit | None
+    practised: Practised | None
     held: dict[float, Held]
     sweep: Sweep | None
 
 
 @dataclass(frozen=True)
+class Outcome:
+    """What counts for the rates: orbit errors by input, and how practice went.
+
+    Attributes:
+        orbit_errors: infinite if the body blew up under the teacher.
+        practice_errors: of the worst jump after teaching and after every round; empty if
+            nothing was taught.
+    """
+
+    orbit_errors: dict[float, float]
+    practice_errors: tuple[float, ...]
+
+
+@dataclass(frozen=True)
 class Result:
-    """The first body, which is drawn, and the orbit errors (seeds,) of all by input."""
+    """The first body, which is drawn, and the outcomes of all."""
 
     config: Config
     first: BodyResult
-    orbit_errors: dict[float, Array]
+    outcomes: list[Outcome]
 
     @property
     def metrics(self) -> dict[str, object]:
         """As written to metrics.json: the first body's numbers, and rates over all seeds."""
         first = self.first
+        fit = first.practised.fit if first.practised else None
         table: dict[str, object] = {
             "eps": {f"{u:g}": run.metrics for u, run in first.held.items()},
             "sweep": self.sweep,
             "taught_inputs": first.start.taught,
-            "train_nrmse": first.fit.train_nrmse if first.fit else None,
-            "condition_number": first.fit.condition_number if first.fit else None,
+            "train_nrmse": fit.train_nrmse if fit else None,
+            "condition_number": fit.condition_number if fit else None,
+            "practice_errors": self.outcomes[0].practice_errors,
         }
         if self.config.seeds > 1:
             table["rates"] = self.rates
@@ -114,16 +131,24 @@ class Result:
     @property
     def rates(self) -> dict[str, dict[str, object]]:
         """How many bodies run each of the inputs jumped to, and all of them."""
-        good = {u: errors < self.config.tolerance for u, errors in self.orbit_errors.items()}
+        tolerance = self.config.tolerance
+        by_input = {
+            u: np.array([one.orbit_errors[u] for one in self.outcomes]) for u in self.config.inputs
+        }
         table = {
             f"{u:g}": {
-                **success_rate(good[u]),
+                **success_rate(errors < tolerance),
                 "median_orbit_error": float(np.median(errors)),
                 "orbit_errors": errors,
             }
-            for u, errors in self.orbit_errors.items()
+            for u, errors in by_input.items()
         }
-        table["all_inputs"] = success_rate(np.logical_and.reduce(list(good.values())))
+        practice = [one.practice_errors for one in self.outcomes]
+        table["all_inputs"] = {
+            **success_rate(np.max(list(by_input.values()), axis=0) < tolerance),
+            "without_practice": success_rate([bool(e) and e[0] < tolerance for e in practice]),
+            "rounds": [max(0, len(errors) - 1) for errors in practice],
+        }
         return table
 
 
@@ -140,34 +165,21 @@ def run(config: Config, *, on_steps: OnSteps = lambda steps: None) -> Result:
     warn_outside(config, start.taught)
     for value in config.all_inputs:
         _check_window(config, SYSTEM.cycle(value))
-    lesson = _lesson(config) if start.w_out is None else None
+    lesson = course_lesson(config) if start.w_out is None else None
     first = _of_first(config, start, lesson, on_steps)
-    errors = {u: [first.held[u].orbit_error] for u in config.inputs}
-    for seed in range(config.seed + 1, config.seed + config.seeds):
-        for value, error in _errors_of_seed(config, seed, lesson, on_steps).items():
-            errors[value].append(error)
-    return Result(config, first, {u: np.array(e) for u, e in errors.items()})
-
-
-def _lesson(config: Config) -> Lesson:
-    """The course, with the target's way along it; the same for every body."""
-    course = config.course
-    return Lesson(
-        SYSTEM.follow(course),
-        course.duration,
-        config.run_in,
-        inputs=lambda times: course(times)[:, None],
-    )
+    others = range(config.seed + 1, config.seed + config.seeds)
+    outcomes = [_of_seed(config, seed, lesson, on_steps) for seed in others]
+    return Result(config, first, [_outcome(config, first.held, first.practised), *outcomes])
 
 
 def _of_first(config: Config, start: Start, lesson: Lesson | None, on_steps: OnSteps) -> BodyResult:
     simulation = Simulation(start.body, timestep=config.timestep, engine=config.engine)
     if lesson is None:
-        fit = None
+        practised = None
         _lead_in(config, simulation)
         simulation.set_readout(start.w_out)
     else:
-        fit = teach_lessons(simulation, [lesson], config.teaching, config.seed, on_steps=on_steps)
+        practised = teach(config, simulation, lesson, config.seed, on_steps)
     w_out, state = simulation.w_out, simulation.snapshot()
     assert w_out is not None
     held = _jump(config, simulation, config.all_inputs, on_steps)
@@ -175,22 +187,25 @@ def _of_first(config: Config, start: Start, lesson: Lesson | None, on_steps: OnS
     if config.sweep > 0:
         simulation.restore(state)
         sweep = _sweep(config, simulation, start.taught, on_steps)
-    return BodyResult(start, w_out, fit, held, sweep)
+    return BodyResult(start, w_out, practised, held, sweep)
 
 
-def _errors_of_seed(
-    config: Config, seed: int, lesson: Lesson | None, on_steps: OnSteps
-) -> dict[float, float]:
-    """Orbit errors of a random body; infinite if it blew up under the teacher."""
+def _of_seed(config: Config, seed: int, lesson: Lesson | None, on_steps: OnSteps) -> Outcome:
+    """A random body, taught and tried."""
     assert lesson is not None
     body = get_start(config, seed).body
     simulation = Simulation(body, timestep=config.timestep, engine=config.engine)
     try:
-        teach_lessons(simulation, [lesson], config.teaching, seed, on_steps=on_steps)
+        practised = teach(config, simulation, lesson, seed, on_steps)
     except DivergenceError:
-        return dict.fromkeys(config.inputs, np.inf)
+        return Outcome(dict.fromkeys(config.inputs, np.inf), ())
     held = _jump(config, simulation, config.inputs, on_steps)
-    return {value: run.orbit_error for value, run in held.items()}
+    return _outcome(config, held, practised)
+
+
+def _outcome(config: Config, held: Mapping[float, Held], practised: Practised | None) -> Outcome:
+    errors = {value: held[value].orbit_error for value in config.inputs}
+    return Outcome(errors, practised.errors if practised else ())
 
 
 def _lead_in(config: Config, simulation: Simulation) -> None:

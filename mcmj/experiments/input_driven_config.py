@@ -16,6 +16,7 @@ from mcmj.driven import QUADRATIC
 from mcmj.errors import InvalidArgumentError, McmjWarning, UnknownNameError
 from mcmj.generator import BodySettings, draw_body
 from mcmj.library import body_path
+from mcmj.practice import Practice
 from mcmj.profiles import Profile, Ramp, hold
 from mcmj.teaching import Teaching
 from mcmj.validation import Array, require_count, require_number
@@ -26,7 +27,10 @@ PROFILES = {
     "mixed": "log 0.1 5 240, log 5 0.1 200, hold 0.1 20, log 0.1 5 240, hold 5 100",
 }
 DRAWN = BodySettings(
-    nodes=100, n_inputs=1, input_fraction=0.5, input_scale=3.0, feedback_fraction=1.0
+    nodes=100, n_inputs=1, input_fraction=0.2, input_scale=2.0, feedback_fraction=1.0
+)
+PRACTICE = Practice(
+    rounds=6, round_runs=1, round_duration=40.0, trial_window=30.0, good_enough=0.03
 )
 
 
@@ -57,6 +61,7 @@ class Config:
         timestep: control and physics step [s].
         engine: mujoco, or twin: faster, the same to rounding.
         settings: what a random body is drawn from.
+        practice: how a body practises the jumps that it misses after teaching.
     """
 
     body: str | None = None
@@ -78,6 +83,7 @@ class Config:
     timestep: float = 1e-3
     engine: str = "mujoco"
     settings: BodySettings = DRAWN
+    practice: Practice = PRACTICE
 
     def __post_init__(self) -> None:
         require_count("seed", self.seed, 0)
