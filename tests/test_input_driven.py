@@ -302,3 +302,13 @@ def test_script_writes_everything(tmp_path):
     again = get_start(Config(body=str(tmp_path / "body.xml"), teach=True), 0)
     assert again.w_out is None
     assert again.taught == (0.1, 5.0)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("readout", "largest"), [("ramp", 0.05), ("mixed", 0.02)])
+def test_the_body_that_comes_along_follows_its_input_in_mujoco(readout, largest):
+    found = input_driven.run(
+        Config(body="input_driven", readout=readout, curve=(), sweep=0.0, free_run=60.0)
+    )
+    assert set(found.first.held) == {0.2, 1.0, 5.0}
+    assert max(held.orbit_error for held in found.first.held.values()) < largest

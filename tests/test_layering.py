@@ -46,6 +46,8 @@ CHAINS = (
     (("readout", "targets"), ("teaching",)),
     (("errors",), ("store",)),
     (("simulation", "metrics"), ("experiments.limit_cycle",)),
+    (("targets", "profiles"), ("driven",)),
+    (("teaching", "driven"), ("experiments.input_lessons",)),
 )
 MUJOCO = {
     "alteration",
