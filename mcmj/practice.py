@@ -1,4 +1,4 @@
-"""Practice: a body learns to find its rhythm by itself, from total rest or from another rhythm.
+"""Practice: a body learns to find its rhythm by itself, from rest or from another rhythm.
 
 Under a teacher the body sees only states near the target; from elsewhere the closed loop passes
 through others, and what the readout says there decides where it ends. So the teacher lets go
@@ -10,7 +10,9 @@ its rounds.
 
 from collections.abc import Callable, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+
+import numpy as np
 
 from mcmj import metrics
 from mcmj.errors import DivergenceError, InvalidArgumentError
@@ -31,7 +33,7 @@ class Practice:
     Attributes:
         rounds: at most so many, after the first fit.
         round_runs: runs in each round, from each start that does not lead home yet.
-        round_duration: of each run [s].
+        round_duration: of each run [s]; of exercises, their lessons' own.
         round_weight: of their squared errors, against 1 for those on the cycle.
         own_shares: s of the first, second, .. round, over and over.
         trial: after every fit, a free run from every start this long [s] ..
@@ -79,6 +81,19 @@ class Practised:
     errors: tuple[float, ...]
 
 
+@dataclass(frozen=True)
+class Exercise:
+    """What is practised from one start.
+
+    Attributes:
+        lesson: from rest or from a snapshot; practice chooses its weight and own share.
+        judge: error of the last part of a free run from there, under the lesson's inputs.
+    """
+
+    lesson: Lesson
+    judge: Judge
+
+
 def practise(
     course: Course,
     target: Target,
@@ -88,70 +103,79 @@ def practise(
     judge: Judge | None = None,
     on_steps: OnSteps = lambda steps: None,
 ) -> Practised:
-    """Practise a target that a course has taught, until every trial is good enough.
+    """Practise a target that a course has taught, from total rest and from other starts.
 
-    A round practises from the starts whose trial was not. The simulation is left where it was.
+    Args:
+        starts: snapshots of the simulation to start from as well, such as another rhythm.
+        judge: error of the last part of a trial; default: the orbit error.
+        course, practice, on_steps: as for `practise_exercises`.
+    """
+    judge = judge or (lambda outputs: metrics.orbit_error(outputs, target))
+    duration = practice.round_duration
+    lessons = [Lesson(target.sample, duration, from_rest=True)]
+    lessons += [Lesson(target.sample, duration, start=start) for start in starts]
+    exercises = [Exercise(lesson, judge) for lesson in lessons]
+    return practise_exercises(course, exercises, practice, on_steps=on_steps)
+
+
+def practise_exercises(
+    course: Course,
+    exercises: Sequence[Exercise],
+    practice: Practice,
+    *,
+    on_steps: OnSteps = lambda steps: None,
+) -> Practised:
+    """Practise until every trial is good enough, each round those whose trial was not.
+
+    The simulation is left where it was.
 
     Args:
         course: has attended its lessons; goes on with those of practice.
-        starts: snapshots of the simulation to start from as well, such as another rhythm.
-        judge: error of the last part of a trial; default: the orbit error.
         on_steps: called with the number of steps done after every chunk, for progress bars.
     """
-    judge = judge or (lambda outputs: metrics.orbit_error(outputs, target))
-    places: list[Array | None] = [None, *starts]  # None: total rest
     fits, trials = [], []
     while True:
         fits.append(course.fit())
-        trials.append([_trial(course.simulation, practice, p, judge, on_steps) for p in places])
+        trials.append([_trial(course.simulation, practice, e, on_steps) for e in exercises])
         if max(trials[-1]) <= practice.good_enough or len(fits) > practice.rounds:
             break
         share = practice.own_shares[(len(fits) - 1) % len(practice.own_shares)]
-        for place, error in zip(places, trials[-1], strict=True):
+        for exercise, error in zip(exercises, trials[-1], strict=True):
             if error > practice.good_enough:
-                _try_lessons(course, target, practice, place, share, on_steps)
+                lesson = replace(exercise.lesson, weight=practice.round_weight, own_share=share)
+                _try_lesson(course, lesson, practice.round_runs, on_steps)
     errors = tuple(max(each) for each in trials)
     best = fits[errors.index(min(errors))]
     course.simulation.set_readout(best.w_out)
     return Practised(best, errors)
 
 
-def _try_lessons(
-    course: Course,
-    target: Target,
-    practice: Practice,
-    start: Array | None,
-    share: float,
-    on_steps: OnSteps,
-) -> None:
-    lesson = Lesson(
-        target.sample, practice.round_duration, weight=practice.round_weight,
-        from_rest=start is None, start=start, own_share=share,
-    )  # fmt: skip
-    for _ in range(practice.round_runs):
+def _try_lesson(course: Course, lesson: Lesson, times: int, on_steps: OnSteps) -> None:
+    for _ in range(times):
         with suppress(DivergenceError):  # there is nothing to learn from where it went
             course.attend(lesson, on_steps=on_steps)
 
 
 def _trial(
-    simulation: Simulation,
-    practice: Practice,
-    start: Array | None,
-    judge: Judge,
-    on_steps: OnSteps,
+    simulation: Simulation, practice: Practice, exercise: Exercise, on_steps: OnSteps
 ) -> float:
     """Error at the end of a free run from a start; the simulation stays as it was."""
-    before, step = simulation.snapshot(), simulation.timestep
+    before, step, lesson = simulation.snapshot(), simulation.timestep, exercise.lesson
     total, last = round(practice.trial / step), round(practice.trial_window / step)
-    if start is None:
-        simulation.reset()
-    else:
-        simulation.restore(start)
+    lesson.begin(simulation)
     try:
-        simulation.rollout(total - last, record=())
-        return judge(simulation.rollout(last, record=("outputs",)).get("outputs"))
+        simulation.rollout(total - last, _inputs(simulation, lesson, total - last), record=())
+        inputs = _inputs(simulation, lesson, last)
+        return exercise.judge(simulation.rollout(last, inputs, record=("outputs",)).get("outputs"))
     except DivergenceError:
         return float("inf")
     finally:
         simulation.restore(before)
         on_steps(total)
+
+
+def _inputs(simulation: Simulation, lesson: Lesson, steps: int) -> Array | None:
+    """The lesson's inputs (steps, n_inputs) from the simulation's time on."""
+    first = round(simulation.time / simulation.timestep)
+    times = simulation.timestep * np.arange(first, first + steps, dtype=np.float64)
+    return None if lesson.inputs is None else lesson.inputs(times)

@@ -79,7 +79,7 @@ def limit_cycle(
     Raises:
         McmjError: no cycle is reached: the system rests, diverges or does not come back.
     """
-    origin = _integrate(rhs, np.asarray(start, dtype=np.float64), transient).y[:, -1]
+    origin = integrate(rhs, np.asarray(start, dtype=np.float64), transient).y[:, -1]
     flow = np.asarray(rhs(0.0, origin))
     if not np.isfinite(origin).all() or np.linalg.norm(flow) < 1e-9:
         raise McmjError(f"{name}: no limit cycle after {transient:g} s, x = {origin}")
@@ -88,7 +88,7 @@ def limit_cycle(
         return float((x - origin) @ flow)
 
     section.direction = 1  # type: ignore[attr-defined]
-    solution = _integrate(rhs, origin, longest_period, events=section, dense_output=True)
+    solution = integrate(rhs, origin, longest_period, events=section, dense_output=True)
     size = np.ptp(solution.y, axis=1).max()
     returns = [
         float(t)
@@ -126,12 +126,13 @@ def van_der_pol() -> Target:
 def quadratic(eps: float = 7.0) -> Target:
     """x1' = x1 + x2 - eps x1 r^2, x2' = -2 x1 + x2 - x2 r^2, r^2 = x1^2 + x2^2 (section 6.1)."""
     require_number("eps", eps, 0.0, open_low=True)
+    return limit_cycle("quadratic", lambda t, x: quadratic_flow(x, eps), [0.1, 0.0])
 
-    def rhs(t: float, x: Array) -> Array:
-        r2 = x @ x
-        return np.array([x[0] + x[1] - eps * x[0] * r2, -2 * x[0] + x[1] - x[1] * r2])
 
-    return limit_cycle("quadratic", rhs, [0.1, 0.0])
+def quadratic_flow(x: Array, eps: float) -> Array:
+    """x' (2,) of the quadratic system at a state x (2,)."""
+    r2 = x @ x
+    return np.array([x[0] + x[1] - eps * x[0] * r2, -2 * x[0] + x[1] - x[1] * r2])
 
 
 def lissajous() -> Target:
@@ -162,7 +163,12 @@ def target(name: str) -> Target:
     return TARGETS[name]()
 
 
-def _integrate(rhs: Callable, start: Array, duration: float, **options):
+def integrate(rhs: Callable, start: Array, duration: float, **options):
+    """solve_ivp's solution of x' = rhs(t, x) from x(0) by DOP853, as exact as targets are.
+
+    Raises:
+        McmjError: it cannot be integrated.
+    """
     solution = solve_ivp(
         rhs, (0.0, duration), start, method="DOP853", rtol=RTOL, atol=ATOL, **options
     )

@@ -30,6 +30,7 @@ class Teaching:
         ridge_per_row: ridge parameter over the number of rows (the sum of their weights); s^2
             does what a length noise of s would, without randomness.
         bias: fit a constant too (the paper's readout has none).
+        every: the regression takes every n-th step only: neighbours at 1 ms are nearly equal.
         rest_runs: number of runs taught from total rest, without washout, beside the one
             above; they teach the body to swing up.
         rest_duration: of each of them [s]; the target starts at time 0 at full size.
@@ -43,6 +44,7 @@ class Teaching:
     length_noise: float = 0.0
     ridge_per_row: float = 0.0
     bias: bool = False
+    every: int = 1
     rest_runs: int = 0
     rest_duration: float = 12.0
     rest_weight: float = 1e-3
@@ -52,6 +54,7 @@ class Teaching:
         require_washout(self.washout, self.duration)
         for name in ("noise", "length_noise", "ridge_per_row"):
             require_number(name, getattr(self, name), 0.0)
+        require_count("every", self.every, 1)
         require_count("rest_runs", self.rest_runs, 0)
         for name in ("rest_duration", "rest_weight"):
             require_number(name, getattr(self, name), 0.0, open_low=True)
@@ -106,6 +109,13 @@ class Lesson:
     def elsewhere(self) -> bool:
         """Whether it begins where the simulation is not."""
         return self.from_rest or self.start is not None
+
+    def begin(self, simulation: Simulation) -> None:
+        """Put a simulation where the lesson begins."""
+        if self.from_rest:
+            simulation.reset()
+        if self.start is not None:
+            simulation.restore(self.start)
 
 
 def teach(
@@ -210,10 +220,7 @@ class Course:
         if lesson.own_share > 0 and self.simulation.w_out is None:
             raise InvalidArgumentError("own_share", "0 before the first fit", lesson.own_share)
         before = self.simulation.snapshot()
-        if lesson.from_rest:
-            self.simulation.reset()
-        if lesson.start is not None:
-            self.simulation.restore(lesson.start)
+        lesson.begin(self.simulation)
         learnt = copy(self._regression)
         try:
             self._follow(lesson, learnt, on_steps)
@@ -231,7 +238,7 @@ class Course:
             times = step * (first + steps).astype(np.float64)
             clean = lesson.outputs(times)
             lengths = self._lengths(lesson, times, clean)
-            learned = steps >= washout
+            learned = (steps >= washout) & (steps % self._teaching.every == 0)
             if learned.any():
                 weight = lesson.weight
                 weights = weight(times[learned]) if callable(weight) else weight

@@ -58,6 +58,8 @@ CHAINS = (
     (("coupled_laws", "arrays"), ("emulation",)),
     (("simulation",), ("probing",)),
     (("theory", "capacity", "filter_tasks"), ("probing",)),
+    (("targets", "profiles"), ("driven",)),
+    (("teaching", "driven"), ("experiments.input_lessons",)),
 )
 MUJOCO = {
     "alteration",

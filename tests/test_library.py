@@ -49,5 +49,7 @@ def test_every_body_says_where_it_comes_from_and_can_be_drawn_again(name):
 
 
 def test_an_unknown_body_lists_those_there_are():
-    with pytest.raises(UnknownNameError, match="general, lissajous, quadratic, van_der_pol"):
+    with pytest.raises(
+        UnknownNameError, match="general, input_driven, lissajous, quadratic, van_der_pol"
+    ):
         body_path("nobody")

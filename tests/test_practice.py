@@ -9,7 +9,7 @@ import twins
 from mcmj import Simulation, Teaching, random_body, teach
 from mcmj.errors import DivergenceError, InvalidArgumentError
 from mcmj.metrics import orbit_error
-from mcmj.practice import Practice, practise
+from mcmj.practice import Exercise, Practice, practise, practise_exercises
 from mcmj.streams import stream
 from mcmj.targets import target
 from mcmj.teaching import Course, Lesson, lessons_of
@@ -97,6 +97,20 @@ def test_other_starts_are_tried_too_and_the_worst_counts(goal):
         outputs = course.simulation.rollout(7500, record=("outputs",)).outputs[-6000:]
         largest.append(np.abs(outputs).max())
     assert min(practised.errors) == max(largest)
+
+
+def test_exercises_are_tried_under_their_inputs(goal):
+    """An input that grows with time, from a snapshot in motion; each judged by its own measure."""
+    simulation = Simulation(random_body(0, nodes=12, n_inputs=1), timestep=STEP, engine="twin")
+    course = Course(simulation, TAUGHT, seed=1)
+    course.attend_all(lessons_of(goal, TAUGHT))
+    start, first = simulation.snapshot(), round(simulation.time / STEP)
+    lesson = Lesson(goal.sample, 5.0, inputs=lambda times: times[:, None] / 40, start=start)
+    exercises = [Exercise(lesson, lambda outputs, c=c: np.abs(outputs[:, c]).max()) for c in (0, 1)]
+    practised = practise_exercises(course, exercises, replace(SHORT, rounds=1, good_enough=1e-9))
+    assert simulation.time == pytest.approx(STEP * first)
+    outputs = simulation.rollout(inputs=STEP * np.arange(first, first + 7500)[:, None] / 40).outputs
+    assert np.abs(outputs[-6000:]).max() == min(practised.errors)
 
 
 def test_practice_ends_when_it_is_good_enough(goal):

@@ -1,0 +1,53 @@
+"""How a body learns to follow its input: the course, then practice of the jumps it misses."""
+
+from functools import partial
+
+import numpy as np
+
+from mcmj import metrics
+from mcmj.experiments.input_driven_config import SYSTEM, Config
+from mcmj.practice import Exercise, Practised, practise_exercises
+from mcmj.profiles import Profile, hold
+from mcmj.progress import OnSteps
+from mcmj.simulation import Simulation
+from mcmj.teaching import Course, Lesson
+from mcmj.validation import Array
+
+
+def course_lesson(config: Config) -> Lesson:
+    """The course, with the target's way along it; the same for every body."""
+    course = config.course
+    return Lesson(
+        SYSTEM.follow(course),
+        course.duration,
+        config.run_in,
+        inputs=lambda times: course(times)[:, None],
+    )
+
+
+def teach(
+    config: Config, simulation: Simulation, lesson: Lesson, seed: int, on_steps: OnSteps
+) -> Practised:
+    """Attend the course, then practise the jumps; the simulation is left where the course ends.
+
+    Raises:
+        DivergenceError: the body blew up under the teacher.
+    """
+    course = Course(simulation, config.teaching, seed)
+    course.attend(lesson, on_steps=on_steps)
+    state = lesson.outputs(np.array([lesson.duration]))[0]
+    jumps = [_jump(config, simulation, state, value) for value in config.inputs]
+    return practise_exercises(course, jumps, config.practice, on_steps=on_steps)
+
+
+def _jump(config: Config, simulation: Simulation, state: Array, value: float) -> Exercise:
+    """From here the input is constant, and the target goes on from its state under it."""
+    duration, start = config.practice.round_duration, simulation.time
+    path = SYSTEM.follow(Profile([hold(value, duration)]), state)
+    lesson = Lesson(
+        lambda times: path(times - start),
+        duration,
+        inputs=lambda times: np.full((len(times), 1), value),
+        start=simulation.snapshot(),
+    )
+    return Exercise(lesson, partial(metrics.orbit_error, target=SYSTEM.cycle(value)))
