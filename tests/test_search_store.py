@@ -251,6 +251,7 @@ def kill_at(folder, store, count):
     return kept
 
 
+@pytest.mark.slow
 def test_a_killed_search_goes_on_where_it_was(tmp_path):
     store = tmp_path / "trials.sqlite"
     kept = kill_at(tmp_path, store, 5)
