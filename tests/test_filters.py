@@ -99,7 +99,7 @@ def test_a_persistent_memory_needs_feedback():
     config = SwitchConfig(exam=120.0)
     result = run_switch(config, 0, engine="twin").metrics
     assert result["pauses_held"] == 1.0
-    assert result["baseline_pauses_held"] == 0.0
+    assert result["baseline_pauses_held"] < 0.5
     assert result["nrmse_std"] < 0.6 < result["baseline_nrmse_std"]
 
 
