@@ -149,12 +149,13 @@ def check(system: ControlSystem, point: Point | None = None) -> Linearisability:
     for _ in range(system.order - 1):
         fields.append(lie_bracket(system.f, fields[-1], system.states))
     matrix = sp.Matrix.hstack(*fields).subs(place)
+    determinant = _determinant(matrix)
     return Linearisability(
         system=system,
         point=place,
         fields=tuple(fields),
-        determinant=sp.factor(_determinant(matrix)),
-        rank=_rank(matrix),
+        determinant=sp.factor(determinant),
+        rank=_rank(matrix) if determinant == 0 else system.order,
         defect=_defect(system, fields[:-1], place),
     )
 
@@ -183,7 +184,7 @@ def _somewhere(matrix: sp.Matrix) -> Point:
 
 def _determinant(matrix: sp.Matrix) -> sp.Expr:
     domain = DomainMatrix.from_Matrix(matrix)
-    return sp.expand(domain.domain.to_sympy(domain.charpoly()[-1]) * (-1) ** matrix.rows)
+    return sp.expand(domain.domain.to_sympy(domain.det()))
 
 
 def _rank(matrix: sp.Matrix) -> int:

@@ -10,7 +10,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from mcmj import metrics
-from mcmj.errors import UnknownNameError
+from mcmj.errors import InvalidArgumentError, UnknownNameError
 from mcmj.experiments.switching import SwitchConfig, SwitchResult, run_switch
 from mcmj.filter_tasks import FilterTask, delayed_recall, delays, narma10, toolbox_narma, volterra
 from mcmj.generator import BodySettings, draw_body
@@ -25,6 +25,7 @@ SAMPLED = ("volterra", "toolbox_narma")  # one input a millisecond
 IN_SYMBOLS = ("narma10", "delayed_recall")  # which share their input, and so one run
 TASKS = (*SAMPLED, *IN_SYMBOLS, "switch")
 TIMESTEP = 1e-3  # s
+REPEAT = 50.0  # s: after which the input of the tasks at 1 ms comes back
 SPARSE = 10  # one in so many samples of a 1 ms task is regressed on: neighbours say the same
 
 
@@ -43,7 +44,9 @@ class Config:
     Attributes:
         tasks: any of volterra, toolbox_narma, narma10, delayed_recall, switch.
         seed: of the body and the inputs.
-        train, washout, test: lengths of the parts of the tasks at 1 ms [s].
+        train, washout, test: lengths of the parts of the tasks at 1 ms [s]. Their input is a
+            product of sines that comes back, with its sign changed, after 50 s: train and test
+            must fit into that, or what is tested was taught.
         symbols, washout_symbols, test_symbols: lengths of the parts of the tasks in symbols.
         hold: how long a symbol is shown [s]: so long that the body can follow it, so short that
             it remembers ten of them. Its undamped modes (seed 0) are at 0.2 to 6 Hz.
@@ -60,9 +63,9 @@ class Config:
 
     tasks: tuple[str, ...] = TASKS
     seed: int = 0
-    train: float = 100.0
+    train: float = 30.0
     washout: float = 20.0
-    test: float = 30.0
+    test: float = 20.0
     symbols: int = 2000
     washout_symbols: int = 100
     test_symbols: int = 500
@@ -84,6 +87,11 @@ class Config:
             require_number(name, getattr(self, name), 0.0, open_low=True)
         for name in ("symbols", "washout_symbols", "test_symbols", "delay", "taps"):
             require_count(name, getattr(self, name), 1)
+        if self.train + self.test > REPEAT:
+            raise InvalidArgumentError(
+                "train", f"train + test <= {REPEAT:g} s, after which the input comes back",
+                f"{self.train + self.test:g} s",
+            )  # fmt: skip
 
 
 @dataclass(frozen=True)
