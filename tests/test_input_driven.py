@@ -157,8 +157,8 @@ def test_practice_of_the_jumps_that_it_misses_helps():
     assert worst == pytest.approx(min(errors), rel=1e-9)  # the sums go in other chunks
 
 
-def test_a_jump_is_practised_from_where_the_course_ends():
-    """The target goes on from its state then, under the constant input."""
+def test_jumps_are_practised_from_the_cycle_where_the_course_ends(monkeypatch):
+    """The target goes on under the constant input; half a turn later it is at -x (symmetry)."""
     heard = []
 
     class Recorded(DrivenSystem):
@@ -166,16 +166,16 @@ def test_a_jump_is_practised_from_where_the_course_ends():
             heard.append((str(profile), start))
             return super().follow(profile, start)
 
-    system = Recorded(**vars(input_driven.SYSTEM))
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(input_lessons, "SYSTEM", system)
-        lesson = input_lessons.course_lesson(QUICK)
-        simulation = Simulation(draw_body(0, SMALL), engine="twin")
-        input_lessons.teach(QUICK, simulation, lesson, 0, lambda steps: None)
+    monkeypatch.setattr(input_lessons, "SYSTEM", Recorded(**vars(input_driven.SYSTEM)))
+    config = replace(QUICK, phases=2)
+    lesson = input_lessons.course_lesson(config)
+    simulation = Simulation(draw_body(0, SMALL), engine="twin")
+    input_lessons.teach(config, simulation, lesson, 0, lambda steps: None)
+    jumps = heard[2:]  # after the course and the cycle at its end
+    assert [profile for profile, _ in jumps] == 2 * ["hold 2.0 20.0", "hold 1.2 20.0"]
     end = lesson.outputs(np.array([30.0]))[0]
-    assert [profile for profile, _ in heard[1:]] == ["hold 2.0 20.0", "hold 1.2 20.0"]
-    for _, start in heard[1:]:
-        np.testing.assert_array_equal(start, end)
+    for sign, (_, start) in zip((1, 1, -1, -1), jumps, strict=True):
+        assert np.abs(start - sign * end).max() < 2e-3  # half a period to the nearest step
     assert simulation.time == pytest.approx(30.0)
 
 

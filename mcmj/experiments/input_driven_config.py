@@ -61,6 +61,7 @@ class Config:
         timestep: control and physics step [s].
         engine: mujoco, or twin: faster, the same to rounding.
         settings: what a random body is drawn from.
+        phases: the jumps are practised from so many moments of the cycle at the profile's end.
         practice: how a body practises the jumps that it misses after teaching.
     """
 
@@ -83,11 +84,13 @@ class Config:
     timestep: float = 1e-3
     engine: str = "mujoco"
     settings: BodySettings = DRAWN
+    phases: int = 1
     practice: Practice = PRACTICE
 
     def __post_init__(self) -> None:
         require_count("seed", self.seed, 0)
         require_count("seeds", self.seeds, 1)
+        require_count("phases", self.phases, 1)
         for name in ("free_run", "tolerance", "timestep"):
             require_number(name, getattr(self, name), 0.0, open_low=True)
         for name in ("run_in", "sweep"):

@@ -1,5 +1,6 @@
 """How a body learns to follow its input: the course, then practice of the jumps it misses."""
 
+from collections.abc import Iterator
 from functools import partial
 
 import numpy as np
@@ -35,9 +36,27 @@ def teach(
     """
     course = Course(simulation, config.teaching, seed)
     course.attend(lesson, on_steps=on_steps)
-    state = lesson.outputs(np.array([lesson.duration]))[0]
-    jumps = [_jump(config, simulation, state, value) for value in config.inputs]
+    end = simulation.snapshot()
+    jumps = []
+    for state in _states(config, simulation, lesson):
+        jumps += [_jump(config, simulation, state, value) for value in config.inputs]
+    simulation.restore(end)
     return practise_exercises(course, jumps, config.practice, on_steps=on_steps)
+
+
+def _states(config: Config, simulation: Simulation, lesson: Lesson) -> Iterator[Array]:
+    """The target's states to jump from, while the teacher leads the body through them."""
+    last, step = config.course.last, simulation.timestep
+    period = SYSTEM.cycle(last).period
+    goal = lesson.outputs(np.array([lesson.duration]))[0]
+    path = SYSTEM.follow(Profile([hold(last, period)]), goal)
+    steps = round(period / config.phases / step)
+    for phase in range(config.phases):
+        yield path(np.array([phase * steps * step]))[0]
+        times = step * (phase * steps + np.arange(steps, dtype=np.float64))
+        if phase + 1 < config.phases:
+            inputs = np.full((steps, 1), last)
+            simulation.rollout(inputs=inputs, offset=path(times), gate=0.0, record=())
 
 
 def _jump(config: Config, simulation: Simulation, state: Array, value: float) -> Exercise:
