@@ -33,22 +33,22 @@ document.title = [...document.images].every(image => image.naturalWidth > 100)
 
 
 def test_numbers_are_looked_up_by_path():
-    assert numbers_at(METRICS, "a.x") == [0.01]
-    assert numbers_at(METRICS, "a.y") == [0.02, np.inf]
-    assert numbers_at(METRICS, "b.*.z") == [1.0, 0.04]
-    for path, text in (("a.w", "'w' is missing"), ("a", "no number"), ("a.x.y", "missing")):
+    assert numbers_at(METRICS, "a/x") == [0.01]
+    assert numbers_at(METRICS, "a/y") == [0.02, np.inf]
+    assert numbers_at(METRICS, "b/*/z") == [1.0, 0.04]
+    for path, text in (("a/w", "'w' is missing"), ("a", "no number"), ("a/x/y", "missing")):
         with pytest.raises(McmjError, match=text):
             numbers_at(METRICS, path)
 
 
 def test_a_claim_holds_unless_the_successes_refute_it():
-    claim = Claim("it works", "yes", "run", ("b.*.z",))
+    claim = Claim("it works", "yes", "run", ("b/*/z",))
     half = judge(claim, METRICS)
     assert half.rate["successes"] == 1
     assert half.holds  # 1 of 2 does not refute 90 %
     many = judge(claim, {"b": [{"z": 1.0}] * 10 + [{"z": 0.0}] * 10})
     assert not many.holds  # 10 of 20 do
-    strict = judge(Claim("all", "all", "run", ("b.*.z",), needed=1.0), METRICS)
+    strict = judge(Claim("all", "all", "run", ("b/*/z",), needed=1.0), METRICS)
     assert not strict.holds
     assert many.ours == "50.00% (0.00% to 100.00%)"
 
@@ -83,7 +83,7 @@ def document(tmp_path):
     figure.add_subplot().plot([0, 1])
     save(figure, tmp_path / "run.png")
     part = PARTS[2]
-    outcome = judge(Claim("<works> & holds", "yes", "run", ("a.x",)), METRICS)
+    outcome = judge(Claim("<works> & holds", "yes", "run", ("a/x",)), METRICS)
     html = page(
         "A <title>", [part], {part.name: [outcome]}, {part.name: [tmp_path / "run.png"]},
         {part.name: ["sh scripts/run.sh perturb"]}, "{}",

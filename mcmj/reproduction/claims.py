@@ -40,7 +40,8 @@ class Claim:
         text: what is claimed.
         paper: the paper's value, or its words.
         run: name of the run whose metrics hold ours.
-        paths: dotted paths in them, each to a number or a list of numbers; all are taken together.
+        paths: in them, keys joined by "/", each to a number or a list of numbers; all are taken
+            together.
         kind: of number, one of FORMATS.
         limit: a value at or below it is a success; None counts as a failure.
         needed: the claim holds unless the successes refute this rate: unless the upper end of
@@ -121,13 +122,13 @@ def judge(claim: Claim, metrics: Mapping[str, object]) -> Outcome:
 
 
 def numbers_at(metrics: Mapping[str, object], path: str) -> list[float]:
-    """Numbers at a dotted path, a null being infinite; `*` stands for every key or item.
+    """Numbers at a path of keys joined by "/", a null being infinite; `*`: every key or item.
 
     Raises:
         McmjError: there is nothing, or no number, at that path.
     """
     found: list[object] = [metrics]
-    for key in path.split("."):
+    for key in path.split("/"):
         found = [inner for outer in found for inner in _inside(outer, key, path)]
     items = [item for each in found for item in (each if isinstance(each, list) else [each])]
     if not items or not all(item is None or isinstance(item, int | float) for item in items):

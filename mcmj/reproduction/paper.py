@@ -23,8 +23,8 @@ FIG5 = Part(
         Run("success_rate", "success_rate", ("--seeds", "50"), ("--seeds", "3")),
     ),
     (
-        *_of_tasks("the general body generates {}", "limit_cycle", "{}.orbit_error"),
-        *_of_tasks("random bodies generate {}", "success_rate", "{}.orbit_errors"),
+        *_of_tasks("the general body generates {}", "limit_cycle", "{}/orbit_error"),
+        *_of_tasks("random bodies generate {}", "success_rate", "{}/orbit_errors"),
     ),
 )
 LONG = Part(
@@ -36,7 +36,7 @@ LONG = Part(
     tuple(
         Claim(
             f"no drift in 1000 s, {name.replace('_', ' ')}: the last 50 s over the second 50 s",
-            "stable for 10^6 steps", "long_run", (f"{name}.windows.orbit_error_ratio",),
+            "stable for 10^6 steps", "long_run", (f"{name}/windows/orbit_error_ratio",),
             kind="ratio", limit=1.1,
         )
         for name in TARGETS
@@ -59,12 +59,12 @@ FIG6 = Part(
     ),
     (
         *(
-            Claim(f"back after {text}", RETURNS, "perturb", (f"seeds.{name}.orbit_errors",))
+            Claim(f"back after {text}", RETURNS, "perturb", (f"seeds/{name}/orbit_errors",))
             for name, text in DISTURBED.items()
         ),
         *(
             Claim(f"time back after {text}", RETURNS, "perturb",
-                  (f"seeds.{name}.recovery_times",), kind="time", limit=40.0)
+                  (f"seeds/{name}/recovery_times",), kind="time", limit=40.0)
             for name, text in DISTURBED.items()
         ),
     ),
@@ -80,7 +80,7 @@ FIG7 = Part(
         ),
     ),
     _of_tasks(
-        "from rest onto {}", "swing_up", "seeds.{}.orbit_errors", "shown for one body"
+        "from rest onto {}", "swing_up", "seeds/{}/orbit_errors", "shown for one body"
     ),
 )  # fmt: skip
 GAIT_RUNS = (
@@ -93,17 +93,17 @@ FIG8 = Part(
     GAIT_RUNS,
     (
         *(
-            Claim(f"the body's {name}", LEARNED, "gaits", (f"{name}.orbit_error",))
+            Claim(f"the body's {name}", LEARNED, "gaits", (f"{name}/orbit_error",))
             for name in GAITS
         ),
         Claim("all 12 switches end in the new gait", "shown for three from walk", "gaits",
-              ("switch.*.orbit_error",), needed=1.0),
-        Claim("time of a switch", "a few periods", "gaits", ("switch.*.switching_time",),
+              ("switch/*/orbit_error",), needed=1.0),
+        Claim("time of a switch", "a few periods", "gaits", ("switch/*/switching_time",),
               kind="time", limit=80.0, needed=1.0),
         Claim("random bodies: worst of the four gaits", LEARNED, "gait_seeds",
-              ("seeds.outcomes.*.worst_orbit_error",)),
+              ("seeds/outcomes/*/worst_orbit_error",)),
         Claim("random bodies: worst of the 12 switches", "not given", "gait_seeds",
-              ("seeds.outcomes.*.worst_switch_error",)),
+              ("seeds/outcomes/*/worst_switch_error",)),
     ),
 )  # fmt: skip
 FIG10 = Part(
@@ -119,12 +119,12 @@ FIG10 = Part(
     ),
     (
         *(
-            Claim(f"eps = {eps}", LEARNED, "input_driven", (f"eps.{eps}.orbit_error",))
+            Claim(f"eps = {eps}", LEARNED, "input_driven", (f"eps/{eps}/orbit_error",))
             for eps in ("5", "1", "0.2")
         ),
         *(
             Claim(f"random bodies, eps = {eps}", "not given", "input_seeds",
-                  (f"rates.{eps}.orbit_errors",))
+                  (f"rates/{eps}/orbit_errors",))
             for eps in ("5", "1", "0.2")
         ),
     ),
