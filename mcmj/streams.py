@@ -29,6 +29,8 @@ PURPOSES = (
     "task_inputs",
     "probe_inputs",
     "input_search",
+    "walk_moments",
+    "walk_pushes",
 )
 
 

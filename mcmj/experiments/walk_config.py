@@ -1,0 +1,128 @@
+"""What the walking experiment runs: its Config, and the body with its gaits."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from itertools import permutations
+
+from mcmj.body import Body
+from mcmj.bodyfile import body_of_model, load_model, readouts_of_model
+from mcmj.errors import InvalidArgumentError, UnknownNameError
+from mcmj.gaits import GAITS, LEGS
+from mcmj.library import body_path
+from mcmj.quadruped import Quadruped
+from mcmj.validation import Array, require_count, require_number
+from mcmj.walker import PUSH_DURATION
+
+PARTS = ("walk", "switch", "push", "adapt", "steps", "cost")
+
+
+@dataclass(frozen=True)
+class Config:
+    """What to run.
+
+    Attributes:
+        gaits: which; the first is the one whose push and switch the video shows.
+        body: a body file with readouts of these gaits, or the name of a body of mcmj's.
+        parts: of the experiment: walk in every gait; switch between them while walking; push
+            and count falls; adapt to slope, load and pushes, with and without coupling;
+            steps: the same walk at other time steps; cost of a step beside the planar scene.
+        seed: of the pushes' directions and moments.
+        pace: of the body, as many times faster than it was taught.
+        timestep: of the body as it was taught [s]; the scene's is that over the pace.
+        settle: walking that is not measured [s].
+        walking: walking that is [s].
+        before, after: a switch comes after this time, and has that to be survived [s].
+        moments: of the stride at which a switch is made.
+        seeds: number of pushes of each size in each gait.
+        impulses: sizes of the pushes [N s], in all horizontal directions, for 0.1 s.
+        survive: a push is survived if the robot does not fall for so long [s].
+        coupling: g, of the legs' load into the body where the ground is part of the computer.
+        slope: of the ground for adapt [degrees], uphill and down.
+        load: on the trunk for adapt [kg].
+        nudge: push sideways for adapt [N s].
+        steps_ms: time steps for steps, of the body as it was taught [ms].
+        robot: its sizes and servos.
+    """
+
+    gaits: tuple[str, ...] = tuple(GAITS)
+    body: str = "gaits"
+    parts: tuple[str, ...] = PARTS
+    seed: int = 0
+    pace: float = 8.0
+    timestep: float = 1e-3
+    settle: float = 5.0
+    walking: float = 20.0
+    before: float = 5.0
+    after: float = 10.0
+    moments: int = 4
+    seeds: int = 20
+    impulses: tuple[float, ...] = (40.0, 80.0, 120.0, 160.0, 200.0)
+    survive: float = 4.0
+    coupling: float = -0.4
+    slope: float = 6.0
+    load: float = 50.0
+    nudge: float = 60.0
+    steps_ms: tuple[float, ...] = (0.25, 0.5, 1.0, 1.5, 2.0)
+    robot: Quadruped = field(default_factory=Quadruped)
+
+    def __post_init__(self) -> None:
+        _names("gait", self.gaits, GAITS)
+        _names("part", self.parts, PARTS)
+        require_count("seed", self.seed, 0)
+        require_count("seeds", self.seeds, 1)
+        require_count("moments", self.moments, 1)
+        for name in ("pace", "timestep", "walking", "before", "after", "survive"):
+            require_number(name, getattr(self, name), 0.0, open_low=True)
+        require_number("survive", self.survive, 2 * PUSH_DURATION)
+        for name in ("settle", "load", "nudge"):
+            require_number(name, getattr(self, name), 0.0)
+        require_number("coupling", self.coupling, -10.0, 10.0)
+        require_number("slope", self.slope, 0.0, 45.0)
+        for name in ("impulses", "steps_ms"):
+            if not getattr(self, name):
+                raise InvalidArgumentError(name, "at least one", ())
+            for value in getattr(self, name):
+                require_number(name, value, 0.0, open_low=True)
+
+    @property
+    def pairs(self) -> tuple[tuple[str, str], ...]:
+        """All ordered switches."""
+        return tuple(permutations(self.gaits, 2))
+
+
+def get_body(config: Config) -> tuple[Body, dict[str, Array]]:
+    """The body, and its readouts of the gaits.
+
+    Raises:
+        InvalidArgumentError, UnknownNameError: a body without one of them, or not four legs.
+    """
+    model = load_model(body_path(config.body))
+    body, readouts = body_of_model(model), readouts_of_model(model)
+    if body.n_outputs != len(LEGS):
+        raise InvalidArgumentError("body", f"{len(LEGS)} feedback channels", body.n_outputs)
+    for name in config.gaits:
+        if name not in readouts:
+            raise UnknownNameError("readout of the body", name, readouts)
+    return body, {name: readouts[name] for name in config.gaits}
+
+
+def total_steps(config: Config) -> int:
+    """Steps of all parts, for a progress bar."""
+    whole, count = config.settle + config.walking, len(config.gaits)
+    seconds = {
+        "walk": count * whole,
+        "switch": len(config.pairs) * (config.before + config.moments * config.after),
+        "push": count * len(config.impulses) * config.seeds * config.survive,
+        "adapt": count * 2 * 5 * whole,
+        "steps": count * sum(whole / (step * 1e-3 / config.timestep) for step in config.steps_ms),
+        "cost": 0.0,
+    }
+    return round(sum(seconds[part] for part in config.parts) * config.pace / config.timestep)
+
+
+def _names(kind: str, given: Sequence[str], known: Sequence[str] | dict) -> None:
+    for name in given:
+        if name not in known:
+            raise UnknownNameError(kind, name, known)
+    if not given or len(set(given)) < len(given):
+        raise InvalidArgumentError(f"{kind}s", "at least one, each once", given)

@@ -1,0 +1,96 @@
+"""The body walks: a quadruped in 3-D driven by its own compliant network, switched and pushed.
+
+With no arguments: the robot and the body that come with mcmj, all parts. --parts walk switch
+runs only these.
+"""
+
+from pathlib import Path
+
+from rich.console import Console
+from rich.table import Table
+
+from mcmj import store
+from mcmj.cli import Output, main
+from mcmj.experiments.walk import Result, run, tour
+from mcmj.experiments.walk_config import Config, total_steps
+from mcmj.plotting import save
+from mcmj.progress import progress_bar
+from mcmj.walkplot import footfalls, pushes, stride_periods
+
+SHOWN = 4.0  # seconds of footfalls in the figure
+
+
+def work(config: Config, output: Output, out: Path) -> None:
+    with progress_bar("walking", total_steps(config), quiet=output.quiet) as on_steps:
+        result = run(config, on_steps=on_steps)
+    draw(result, out)
+    if output.video:
+        film(result, out)
+    store.write_metrics(out / "metrics.json", "walk", config, config.seed, result.metrics)
+    if not output.quiet:
+        show(result, out)
+
+
+def draw(result: Result, out: Path) -> None:
+    table = store.plain(result.metrics)
+    if result.walks:
+        titles = {
+            name: f"{name}: {table[name]['stride_period_s']:.2f} s, "
+            + (f"{table[name]['speed_m_s']:.2f} m/s" if table[name]["speed_m_s"] else "falls")
+            for name in result.walks
+        }
+        save(footfalls(result.walks, titles, shown=SHOWN), out / "footfalls.png")
+    if "push" in table:
+        counts = {name: table["push"][name]["survived"] for name in result.config.gaits}
+        save(pushes(counts, result.config.seeds), out / "pushes.png")
+    if "adapt" in table:
+        periods = {
+            name: {
+                label: {ground: row["stride_period_s"] or float("nan")
+                        for ground, row in rows.items() if "stride_period_s" in row}
+                for label, rows in by_coupling.items()
+            }
+            for name, by_coupling in table["adapt"].items()
+        }  # fmt: skip
+        save(stride_periods(periods), out / "adapt.png")
+
+
+def film(result: Result, out: Path) -> None:
+    from mcmj.walkvideo import Event, walk_video  # needs OpenGL, the rest does not
+
+    walker, walk, events = tour(result.lesson)
+    walk_video(out / "walk.mp4", walker.model, walk, [Event(*event) for event in events])
+
+
+def show(result: Result, out: Path) -> None:
+    console, table = Console(), store.plain(result.metrics)
+    if result.walks:
+        rows = Table(title=f"{result.config.walking:g} s of walking")
+        names = ("gait", "distance", "speed", "cost of transport", "stride period", "falls")
+        for name in names:
+            rows.add_column(name, justify="left" if name == "gait" else "right")
+        for name in result.walks:
+            row = table[name]
+            walked = ["-"] * 3 if row["falls"] else [
+                f"{row['distance_m']:.1f} m", f"{row['speed_m_s']:.2f} m/s",
+                f"{row['cost_of_transport']:.2f}",
+            ]  # fmt: skip
+            period = row["stride_period_s"]
+            rows.add_row(name, *walked, f"{period:.3f} s" if period else "-", str(row["falls"]))
+        console.print(rows)
+    if "switch" in table:
+        falls = sum(row["falls"] for row in table["switch"].values())
+        total = len(table["switch"]) * result.config.moments
+        console.print(f"{falls} falls in {total} switches while walking")
+    if "push" in table:
+        for name in result.config.gaits:
+            counts = table["push"][name]["survived"]
+            text = ", ".join(f"{count} at {impulse} N s" for impulse, count in counts.items())
+            console.print(f"{name}: of {result.config.seeds} pushes survived {text}")
+    if "cost" in table:
+        console.print(f"a step costs {table['cost']['ratio']:.2f} times the planar body's alone")
+    console.print(f"results in {out}")
+
+
+if __name__ == "__main__":
+    main("walk", Config, work)
