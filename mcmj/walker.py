@@ -81,7 +81,7 @@ def walking_model(
     )  # fmt: skip
     beside = body.positions[:, 1].min() - 2 * robot.leg
     above = robot.standing_height * np.array([-np.sin(terrain.slope), 0.0, np.cos(terrain.slope)])
-    frame = spec.worldbody.add_frame(pos=[0.0, beside, 0.0] + above, quat=tilt)
+    frame = spec.worldbody.add_frame(pos=above + np.array([0.0, beside, 0.0]), quat=tilt)
     loaded = replace(robot, trunk=robot.trunk + terrain.load)
     spec.attach(mujoco.MjSpec.from_string(quadruped_mjcf(loaded)), prefix=ROBOT, frame=frame)
     spec.nuser_actuator = body.n_springs + _LEG_SENSORS + 1
@@ -91,7 +91,8 @@ def walking_model(
 def _paint_squares(spec: mujoco.MjSpec, side: float) -> None:
     """A ground on which motion shows: squares as long as a leg [m]."""
     spec.add_texture(
-        name="squares", type=mujoco.mjtTexture.mjTEXTURE_2D, builtin=mujoco.mjtBuiltin.mjBUILTIN_CHECKER,
+        name="squares", type=mujoco.mjtTexture.mjTEXTURE_2D,
+        builtin=mujoco.mjtBuiltin.mjBUILTIN_CHECKER,
         rgb1=[0.97, 0.97, 0.95], rgb2=[0.9, 0.91, 0.89], width=64, height=64,
     )  # fmt: skip
     textures = [""] * mujoco.mjtTextureRole.mjNTEXROLE
@@ -144,6 +145,8 @@ class Walker:
         self._nodes = 2 * len(self.body.free)  # joints of the body; the trunk's come next
         self._cut = False
         self._readout = np.zeros((len(LEGS), self.body.n_springs + 1))
+        for name in ("sensordata", "qfrc_actuator"):  # copied out by calls after this one only
+            self._batch.bind(name)
 
     @property
     def copies(self) -> int:
@@ -167,17 +170,17 @@ class Walker:
 
     def set_gait(self, gait: LegReadout) -> None:
         """Switch the readouts, at once."""
-        weights = self._weights(gait)
-        if self._cut:  # a broken spring measures nothing
-            weights[:, : self.body.n_springs] = 0.0
-        self._batch.expand("actuator_user")[:] = weights
+        if self._cut:  # broken springs measure nothing
+            gait = replace(gait, swing=0 * gait.swing, lift=0 * gait.lift)
+        self._gait = gait
+        self._batch.expand("actuator_user")[:] = self._weights(gait)
 
     def cut_springs(self) -> None:
-        """Cut all springs of the body: they pull no more, and their sensors are gone."""
+        """Cut all springs of the body: they pull no more, and no readout hears from them."""
         for name in ("stiffness", "stiffnesspoly", "damping", "dampingpoly"):
             self._batch.expand(f"tendon_{name}")[:] = 0.0
-        self._batch.expand("actuator_user")[:, :, : self.body.n_springs] = 0.0
         self._cut = True
+        self.set_gait(self._gait)
 
     def freeze(self) -> None:
         """Hold all nodes of the body where they are, by dampers that let nothing through."""
@@ -217,8 +220,8 @@ class Walker:
         require_count("duration / sample", count, 1)
         force = self._batch.bind("xfrc_applied")[:, self.model.body(ROBOT + "trunk").id]
         pushed = round(PUSH_DURATION / (stride * self.timestep))
-        impulse = as_array("push", np.broadcast_to(0.0 if push is None else push, (self.copies, 2)),
-                           (self.copies, 2))  # fmt: skip
+        given = np.broadcast_to(np.asarray(0.0 if push is None else push), (self.copies, 2))
+        impulse = as_array("push", given, (self.copies, 2))
         rows: dict[str, list[Array]] = {}
         with quiet_warnings():
             for k in range(count):
@@ -228,7 +231,8 @@ class Walker:
                     rows.setdefault(name, []).append(values)
         self._check_alive()
         recorded = {name: np.stack(values, axis=1) for name, values in rows.items()}
-        return Walk(stride * self.timestep * np.arange(1, count + 1), **recorded)
+        times = stride * self.timestep * np.arange(1, count + 1, dtype=np.float64)
+        return Walk(times, **recorded)
 
     # --- inside ------------------------------------------------------------------------------
 
@@ -236,7 +240,9 @@ class Walker:
         """Make inputs and drives of the legs user actuators over springs and leg sensors."""
         model, robot = self.model, self.robot
         first = model.sensor("length0").adr[0]
-        gates = {f"in{c}": 1.0 for c in range(len(LEGS))} | {f"fb{c}": 1.0 for c in range(len(LEGS))}
+        gates = {f"in{c}": 1.0 for c in range(len(LEGS))} | {
+            f"fb{c}": 1.0 for c in range(len(LEGS))
+        }
         for leg in LEGS:
             gates[f"{ROBOT}{leg}_swing"] = robot.hip_stiffness
             gates[f"{ROBOT}{leg}_lift"] = robot.leg_stiffness

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -58,12 +59,12 @@ def joined(parts: Sequence[Walk]) -> Walk:
     """One walk from consecutive ones of the same sampling."""
     step = parts[0].sample
     fields = ("trunk", "outputs", "contact", "power", "joints")
-    arrays = {}
+    arrays: dict[str, Any] = {}
     for name in fields:
         pieces = [getattr(part, name) for part in parts]
         arrays[name] = None if pieces[0] is None else np.concatenate(pieces, axis=1)
     count = sum(len(part.times) for part in parts)
-    return Walk(step * np.arange(1, count + 1), **arrays)
+    return Walk(step * np.arange(1, count + 1, dtype=np.float64), **arrays)
 
 
 def fall_times(walk: Walk, leg: float, slope: float = 0.0) -> Array:

@@ -96,8 +96,8 @@ class GaitDiagram:
             if event.time <= now:
                 label = event.label
                 if event.time > now - SHOWN:
-                    x = left + scale * (event.time - now + SHOWN)
-                    draw.line((x, top - 6, x, top + 4 * row), fill=MARK, width=2)
+                    at = left + scale * (event.time - now + SHOWN)
+                    draw.line((at, top - 6, at, top + 4 * row), fill=MARK, width=2)
         draw.text((8, 8), label, fill=MARK, font=ImageFont.load_default(size=22))
         draw.text((SIDE - 74, 12), f"{now:5.1f} s", fill=INK, font=self._font)
         draw.text((left, height - 24), f"feet on the ground, last {SHOWN:g} s", fill=INK,

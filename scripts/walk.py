@@ -5,6 +5,7 @@ runs only these.
 """
 
 from pathlib import Path
+from typing import Any
 
 from rich.console import Console
 from rich.table import Table
@@ -32,7 +33,7 @@ def work(config: Config, output: Output, out: Path) -> None:
 
 
 def draw(result: Result, out: Path) -> None:
-    table = store.plain(result.metrics)
+    table: Any = store.plain(result.metrics)
     if result.walks:
         titles = {
             name: f"{name}: {table[name]['stride_period_s']:.2f} s, "
@@ -63,7 +64,8 @@ def film(result: Result, out: Path) -> None:
 
 
 def show(result: Result, out: Path) -> None:
-    console, table = Console(), store.plain(result.metrics)
+    console = Console()
+    table: Any = store.plain(result.metrics)
     if result.walks:
         rows = Table(title=f"{result.config.walking:g} s of walking")
         names = ("gait", "distance", "speed", "cost of transport", "stride period", "falls")

@@ -77,6 +77,8 @@ MUJOCO = {
     "simulation",
     "structs",
     "viewer",
+    "walker",
+    "walkvideo",
 }
 
 

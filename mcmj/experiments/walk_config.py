@@ -50,19 +50,19 @@ class Config:
     seed: int = 0
     pace: float = 8.0
     timestep: float = 1e-3
-    settle: float = 5.0
-    walking: float = 20.0
-    before: float = 5.0
-    after: float = 10.0
+    settle: float = 3.0
+    walking: float = 10.0
+    before: float = 3.0
+    after: float = 6.0
     moments: int = 4
     seeds: int = 20
-    impulses: tuple[float, ...] = (40.0, 80.0, 120.0, 160.0, 200.0)
-    survive: float = 4.0
+    impulses: tuple[float, ...] = (50.0, 100.0, 150.0, 200.0)
+    survive: float = 3.0
     coupling: float = -0.4
     slope: float = 6.0
     load: float = 50.0
     nudge: float = 60.0
-    steps_ms: tuple[float, ...] = (0.25, 0.5, 1.0, 1.5, 2.0)
+    steps_ms: tuple[float, ...] = (0.5, 1.0, 2.0)
     robot: Quadruped = field(default_factory=Quadruped)
 
     def __post_init__(self) -> None:
