@@ -58,7 +58,8 @@ def stride_periods(periods: Mapping[str, Mapping[str, Mapping[str, float]]]) -> 
     """Stride periods on every ground, without and with coupling, over the flat uncoupled one.
 
     Args:
-        periods: by gait, then by coupling ("uncoupled", "coupled"), then by ground.
+        periods: by gait, then by coupling ("uncoupled", "coupled"), then by ground; NaN where
+            the robot falls.
     """
     figure = new_figure(10.0, 3.6)
     row = figure.subplots(1, len(periods), sharey=True, squeeze=False)[0]
@@ -68,6 +69,8 @@ def stride_periods(periods: Mapping[str, Mapping[str, Mapping[str, float]]]) -> 
             change = [100 * (period / base - 1) for period in by_coupling[label].values()]
             places = np.arange(len(change)) + 0.4 * offset - 0.2
             axes.bar(places, change, 0.38, color=colour, label=label)
+            for place in places[~np.isfinite(change)]:
+                axes.annotate("falls", (place, 0), rotation=90, ha="center", va="bottom")
         axes.set_xticks(np.arange(len(change)), list(by_coupling["coupled"]), rotation=40)
         axes.axhline(0, color="black", lw=0.8)
         axes.set_title(name)

@@ -11,7 +11,8 @@ from rich.table import Table
 
 from mcmj import certplot, plotting, store
 from mcmj.cli import Output, main
-from mcmj.experiments.certify import STAGES, Config, Result, run
+from mcmj.experiments.certify import STAGES, Result, run
+from mcmj.experiments.certify_config import Config
 from mcmj.progress import progress_bar
 from mcmj.stability.basin import Survey
 

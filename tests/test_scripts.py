@@ -230,3 +230,57 @@ def test_capacity(tmp_path):
     for name in ("memory_capacity", "ipc_total", "kernel_rank"):
         assert metrics[name] >= 0
     assert np.shape(metrics["maps"]["size_strength"]["ipc_total"]) == (1, 2)
+
+
+def test_perturb_and_swing_up(tmp_path):
+    taught = ["--task", "quadratic", "--seed", "0", "--nodes", "12", "--engine", "twin"]
+    taught += ["--duration", "12", "--washout", "4", "--rest-runs", "0"]
+    runs = {
+        "perturb": (["--before", "1", "--window", "1", "--after", "15", "--error-window", "12",
+                     "--noise-curve", "0.1"], "frozen_x1", "recovery_time"),
+        "swing_up": (["--free-run", "15", "--window", "12", "--kicks", "1", "--rounds", "0",
+                      "--trial", "13", "--trial-window", "12"], "tasks", "quadratic"),
+    }  # fmt: skip
+    for name, (options, key, inner) in runs.items():
+        out = tmp_path / name
+        status, shown, err = run(name, *taught, *options, "--out", out)
+        assert status == 0, err
+        assert "results in" in shown
+        assert inner in metrics_of(out)["metrics"][key]
+        assert (out / f"{name}.png").stat().st_size > 10_000
+        with np.load(out / "trajectory.npz", allow_pickle=False) as arrays:
+            assert any(array.endswith("/outputs") for array in arrays)
+
+
+@pytest.mark.slow
+def test_walk(tmp_path):
+    """A push that throws the robot over is a fall, and leaves no recovery to be told."""
+    options = ["--parts", "walk", "adapt", "--gaits", "trot", "--settle", "2", "--walking", "3"]
+    options += ["--nudge", "3000", "--no-video", "--out", tmp_path]
+    status, out, err = run("walk", *options)
+    assert status == 0, err
+    assert "trot" in out
+    metrics = metrics_of(tmp_path)["metrics"]
+    assert metrics["trot"]["falls"] == 0
+    assert metrics["trot"]["speed_m_s"] > 1.0
+    for label in ("uncoupled", "coupled"):
+        push = metrics["adapt"]["trot"][label]["push"]
+        assert push["falls"] == 1
+        assert push["recovery_s"] is None
+        assert push["phase_shift"] is None
+    for figure in ("footfalls.png", "adapt.png"):
+        assert (tmp_path / figure).stat().st_size > 10_000
+
+
+@pytest.mark.slow
+def test_certify(tmp_path):
+    options = ["--task", "quadratic", "--body", "quadratic", "--free-run", "25", "--recovery", "25",
+               "--scales", "1", "--phases", "2", "--kicks", "0.5", "--pushes", "1", "--copies", "4",
+               "--refine", "2", "--out", tmp_path]  # fmt: skip
+    status, out, err = run("certify", *options)
+    assert status == 0, err
+    assert "leading nontrivial multiplier" in out
+    wanted = {"floquet_multipliers", "leading_nontrivial", "basin_fraction", "lyapunov_exponent",
+              "force_tolerance", "noise_tolerance"}  # fmt: skip
+    assert wanted <= set(metrics_of(tmp_path)["metrics"])
+    assert (tmp_path / "certificate.png").stat().st_size > 10_000

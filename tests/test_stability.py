@@ -7,6 +7,7 @@ from scipy.integrate import quad
 import mcmj
 from mcmj.errors import InvalidArgumentError, McmjError
 from mcmj.experiments import certify
+from mcmj.experiments.certify_config import Config
 from mcmj.stability.basin import kicked, on_cycle, pushed, scaled_starts, survey
 from mcmj.stability.confirm import directional, ensemble_map
 from mcmj.stability.cycle import find_cycle, flow_map, weights_at
@@ -225,7 +226,7 @@ def test_bisection_finds_a_threshold_and_says_when_there_is_none():
 
 # --- the certificate -------------------------------------------------------------------------
 
-BRIEF = certify.Config(
+BRIEF = Config(
     task="quadratic", body="quadratic", free_run=25.0, window=20.0, recovery=25.0,
     scales=(0.5, 1.0), phases=2, kicks=(0.5,), pushes=(1.0,), copies=4, refine=2,
 )  # fmt: skip
@@ -263,7 +264,7 @@ def test_a_certificate_is_complete_and_its_numbers_are_those_of_its_parts():
 )
 def test_wrong_certificates_are_refused_before_anything_runs(name, value):
     with pytest.raises(InvalidArgumentError, match=name):
-        certify.Config(**{name: value})
+        Config(**{name: value})
 
 
 def test_a_loop_that_rests_has_no_cycle(body):

@@ -20,7 +20,7 @@ from mcmj.targets import TARGETS, Target, target
 from mcmj.teaching import Teaching, teach
 from mcmj.validation import Array, require_count, require_number
 
-# chosen by the recoveries of bodies 100 to 159, on the twin
+# chosen by the recoveries of bodies 0 to 19 and 100 to 239, on the twin
 DRAWN = BodySettings(nodes=20, feedback_fraction=0.5, d1=(0.1, 2.0))
 TAUGHT = Teaching(
     noise=0.4,

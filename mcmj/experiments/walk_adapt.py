@@ -51,19 +51,24 @@ def _on(lesson: Lesson, name: str, terrain: Terrain, coupling: float) -> Table:
 def nudged(lesson: Lesson, name: str, coupling: float) -> Table:
     """What a push sideways does to the rhythm, beside the same walk without it.
 
-    recovery_s is when outputs are within 10 % of the other's orbit for good, phase_shift by how
-    much, in periods, the pushed one is then ahead.
+    recovery_s is when outputs are within 10 % of the other's orbit for good (0: they were never
+    further), phase_shift by how much, in periods, the pushed one is then ahead; neither is known
+    (NaN) if one of the two falls.
     """
     config = lesson.config
     walker = lesson.walker(coupling=coupling, copies=2)
     walker.start(lesson.gaits[name])
     walker.advance(round(config.settle / walker.timestep))
     walk = walker.walk(config.walking, push=[[0.0, 0.0], [0.0, config.nudge]])
+    fallen = np.isfinite(walkmetrics.fall_times(walk, config.robot.leg))
+    upright = not fallen.any()
     period = walkmetrics.stride_period(walk.after(config.walking / 2), lesson.period(name))
-    steady = np.isfinite(period)
+    steady = upright and np.isfinite(period)
     return {
-        "falls": int(np.isfinite(walkmetrics.fall_times(walk, config.robot.leg)[1])),
-        "recovery_s": recovery(walk.outputs[1], walk.outputs[0], walk.sample),
+        "falls": int(fallen[1]),
+        "recovery_s": (
+            recovery(walk.outputs[1], walk.outputs[0], walk.sample) if upright else np.nan
+        ),
         "phase_shift": walkmetrics.phase_shift(walk, period, 1) if steady else np.nan,
     }
 
