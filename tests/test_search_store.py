@@ -8,6 +8,7 @@ import sqlite3
 import subprocess
 import sys
 import tempfile
+import threading
 import time
 from contextlib import contextmanager
 from pathlib import Path
@@ -305,3 +306,26 @@ def test_export(tmp_path):
     parquet = pytest.importorskip("pyarrow.parquet")
     read = parquet.read_table(tmp_path / "a.parquet").to_pydict()
     assert read == columns
+
+
+def test_many_searches_may_make_one_store_at_the_same_moment(tmp_path):
+    """Eight threads behind a barrier, forty new stores: nobody is refused."""
+    refused = []
+
+    def enter(path, barrier):
+        barrier.wait()
+        try:
+            with TrialStore(path) as store:
+                assert len(store) == 0
+        except Exception as error:
+            refused.append(error)
+
+    for number in range(40):
+        barrier = threading.Barrier(8)
+        path = tmp_path / f"store{number}"
+        threads = [threading.Thread(target=enter, args=(path, barrier)) for _ in range(8)]
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join()
+    assert not refused

@@ -150,10 +150,9 @@ class TrialStore:
 
     def _open(self) -> None:
         self._db.execute(f"PRAGMA busy_timeout = {round(1e3 * _PATIENCE)}")
-        application = self._pragma("application_id")
-        if application == 0 and self._is_empty():
+        if self._is_empty():
             self._create()
-        elif application != APPLICATION:
+        if self._pragma("application_id") != APPLICATION:  # read now: who made it may be another
             raise StoreError(f"{self.path}: a database, but not a store of mcmj's trials")
         if (schema := self._pragma("user_version")) != SCHEMA:
             raise StoreError(
@@ -171,7 +170,8 @@ class TrialStore:
     def _create(self) -> None:
         self._db.execute("PRAGMA journal_mode = WAL")
         with self._transaction():
-            if self._is_empty():  # else another process was faster
+            # else another process was faster, or it is another program's, still empty
+            if self._is_empty() and self._pragma("application_id") == 0:
                 for statement in _TABLES.split(";")[:-1]:
                     self._db.execute(statement)
                 self._db.execute(f"PRAGMA application_id = {APPLICATION}")
