@@ -24,6 +24,7 @@ APPLICATION = 0x6D636D6A  # "mcmj", in the file's header
 SCHEMA = 1
 LEASE = 60.0  # s: a claim that was not renewed for so long is void
 _PATIENCE = 60.0  # s to wait for another process's write
+_RETRY = 0.01  # s between tries where SQLite does not wait
 _BATCH = 500  # keys in one query
 
 _TABLES = """
@@ -162,13 +163,13 @@ class TrialStore:
         fault = self._pragma("quick_check")
         if fault != "ok":
             raise StoreError(f"{self.path}: damaged ({fault}); {_RESCUE}")
-        self._db.execute("PRAGMA journal_mode = WAL")
+        self._use_write_ahead_log()
         self._db.execute("PRAGMA synchronous = NORMAL")
         with self._transaction():  # a read-only file is refused now and not after the first trial
             self._db.execute("DELETE FROM claims WHERE until < ?", [time.time()])
 
     def _create(self) -> None:
-        self._db.execute("PRAGMA journal_mode = WAL")
+        self._use_write_ahead_log()
         with self._transaction():
             # else another process was faster, or it is another program's, still empty
             if self._is_empty() and self._pragma("application_id") == 0:
@@ -176,6 +177,19 @@ class TrialStore:
                     self._db.execute(statement)
                 self._db.execute(f"PRAGMA application_id = {APPLICATION}")
                 self._db.execute(f"PRAGMA user_version = {SCHEMA}")
+
+    def _use_write_ahead_log(self) -> None:
+        """Wait for others by ourselves: SQLite's busy timeout does not hold for this."""
+        deadline = time.monotonic() + _PATIENCE
+        while True:
+            try:
+                self._db.execute("PRAGMA journal_mode = WAL")
+                return
+            except sqlite3.OperationalError as error:
+                busy = error.sqlite_errorcode & 0xFF == sqlite3.SQLITE_BUSY
+                if not busy or time.monotonic() > deadline:
+                    raise
+                time.sleep(_RETRY)
 
     def _is_empty(self) -> bool:
         return self._db.execute("SELECT count(*) FROM sqlite_master").fetchone()[0] == 0
