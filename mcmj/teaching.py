@@ -263,8 +263,16 @@ class Course:
         return lengths
 
 
-def synchronise(simulation: Simulation, target: Target, duration: float) -> None:
-    """Bring a body onto the target by clean teacher forcing, without learning."""
+def synchronise(
+    simulation: Simulation, target: Target, duration: float, inputs: object = None
+) -> None:
+    """Bring a body onto the target by clean teacher forcing, without learning.
+
+    Args:
+        duration: [s].
+        inputs: (n_inputs,) held meanwhile; default: 0.
+    """
     step = simulation.timestep
     steps = round(simulation.time / step) + np.arange(round(duration / step))
-    simulation.rollout(offset=target.sample(steps * step), gate=0.0, record=())
+    held = None if inputs is None else np.tile(np.asarray(inputs, np.float64), (len(steps), 1))
+    simulation.rollout(inputs=held, offset=target.sample(steps * step), gate=0.0, record=())

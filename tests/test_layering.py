@@ -60,6 +60,7 @@ CHAINS = (
     (("theory", "capacity", "filter_tasks"), ("probing",)),
     (("targets", "profiles"), ("driven",)),
     (("teaching", "driven"), ("experiments.input_lessons",)),
+    (("environment_setting", "environment_task"), ("environment",)),
 )
 MUJOCO = {
     "alteration",
