@@ -1,6 +1,7 @@
 import numpy as np
 import pytest
 from hypothesis import settings
+from rollouts import T
 
 import mcmj
 from mcmj.stability.cycle import find_cycle
@@ -58,3 +59,15 @@ def taught_loop():
     loop = ClosedLoop(body, fit.w_out)
     cycle = find_cycle(loop, loop.vector(simulation.state), goal.period, settle=60.0)
     return loop, cycle, goal
+
+
+@pytest.fixture(scope="session")
+def drive(body):
+    """Everything that can push, over T steps."""
+    rng = np.random.default_rng(3)
+    return {
+        "inputs": rng.normal(size=(T, body.n_inputs)),
+        "offset": rng.normal(size=(T, body.n_outputs)),
+        "gate": np.array([1.0, 0.4]),
+        "forces": 5 * rng.normal(size=(T, body.n_nodes)),
+    }

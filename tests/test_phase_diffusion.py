@@ -98,4 +98,6 @@ def test_a_taught_body_has_the_jitter_of_its_phase_responses(taught_loop):
     assert abs(found.jitter / 1e-4 - expected) < 3 * found.jitter_error / 1e-4
     strong, weak = (phase_diffusion(loop, cycle, s, copies=32).shifts for s in (1e-4, 1e-5))
     spread = strong.std()
-    np.testing.assert_allclose(10 * (weak - weak.mean()), strong - strong.mean(), atol=0.01 * spread)
+    np.testing.assert_allclose(
+        10 * (weak - weak.mean()), strong - strong.mean(), atol=0.01 * spread
+    )
