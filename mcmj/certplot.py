@@ -100,9 +100,10 @@ def _draw_tolerances(
         if np.isfinite(high):
             bar, y = [[median - low], [high - median]], 0.5 + 0.04 * (row - 1)
             axes.errorbar(median, y, xerr=bar, fmt="o", ms=4, capsize=3, color=line.get_color())
-    axes.set(xlabel="amplitude for 10 s", ylabel="fraction that recovers", ylim=(-0.05, 1.05))
+    axes.set(xlabel="amplitude for 10 s", ylabel="fraction that recovers")
+    axes.set(yticks=np.linspace(0, 1, 6), ylim=(-0.4, 1.05))  # room for the legend
     axes.set_title("tolerances; medians with 95 % intervals")
-    axes.legend(fontsize=8, loc="best")
+    axes.legend(fontsize=8, loc="lower left")
     axes.grid(alpha=0.3)
 
 

@@ -21,11 +21,12 @@ from mcmj.bodyfile import (
 from mcmj.driven import QUADRATIC
 from mcmj.errors import InvalidArgumentError, UnknownNameError
 from mcmj.gaits import GAITS, LEGS, gait_target
+from mcmj.lessons import Teaching
 from mcmj.library import body_names, body_path
 from mcmj.options import Options
 from mcmj.simulation import Simulation
 from mcmj.targets import TARGETS, Target, target
-from mcmj.teaching import Teaching, synchronise, teach
+from mcmj.teaching import synchronise, teach
 from mcmj.trajectory import State
 from mcmj.validation import Array
 

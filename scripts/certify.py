@@ -83,9 +83,9 @@ def lines(result: Result) -> list[tuple[str, str]]:
         ("starts that recover", f"{100 * result.starts.fraction:.1f} %"),
         ("  median, longest time", f"{np.median(times):.1f} s, {times.max():.1f} s"
          if times.size else "none"),
-        ("median force tolerance (10 s)", over_copies(result.force_fine, "N")),
+        ("median force tolerance", over_copies(result.force_fine, "N")),
         ("  at the body's own step", over_copies(result.force, "N")),
-        ("median noise tolerance (10 s)", over_copies(result.noise, "m")),
+        ("median noise tolerance", over_copies(result.noise, "m")),
         ("pushes judged alike by MuJoCo", f"{agreeing} of {of}"),
     ]  # fmt: skip
 

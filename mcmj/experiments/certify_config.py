@@ -5,8 +5,8 @@ from dataclasses import dataclass, field
 from mcmj import metrics
 from mcmj.errors import UnknownNameError
 from mcmj.experiments import limit_cycle
+from mcmj.lessons import Teaching
 from mcmj.targets import TARGETS, target
-from mcmj.teaching import Teaching
 from mcmj.validation import as_array, require_above, require_count, require_number
 
 

@@ -18,11 +18,11 @@ from mcmj.bodyfile import (
 from mcmj.errors import InvalidArgumentError, McmjWarning, UnknownNameError
 from mcmj.freerun import WINDOW
 from mcmj.generator import BodySettings, draw_body
+from mcmj.lessons import Teaching
 from mcmj.library import body_path
 from mcmj.options import DEFAULT_INTEGRATOR, ENGINES
 from mcmj.spring_laws import NATIVE
 from mcmj.targets import TARGETS, Target
-from mcmj.teaching import Teaching
 from mcmj.validation import Array, require_number
 
 

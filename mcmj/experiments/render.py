@@ -9,14 +9,16 @@ from mcmj.body import Body
 from mcmj.bodyfile import body_of_model, load_model, readout_of_model, readouts_of_model
 from mcmj.errors import InvalidArgumentError, TrajectoryFileError, UnknownNameError
 from mcmj.film import Film, Window
+from mcmj.lessons import Teaching
 from mcmj.library import body_path
+from mcmj.phases import Phase, Schedule
 from mcmj.progress import OnSteps
 from mcmj.rendering import ORBIT_POINTS, Style
-from mcmj.schedule import Phase, Schedule, ScheduleRun, run_schedule
+from mcmj.schedule import ScheduleRun, run_schedule
 from mcmj.simulation import Simulation
 from mcmj.streams import stream
 from mcmj.targets import TARGETS, Target, target
-from mcmj.teaching import Teaching, synchronise, teach
+from mcmj.teaching import synchronise, teach
 from mcmj.trajectory import Trajectory, join
 from mcmj.trajectory_file import load_trajectory
 from mcmj.validation import Array, require_count, require_number
