@@ -20,12 +20,12 @@ from mcmj.bodyfile import (
 )
 from mcmj.driven import QUADRATIC
 from mcmj.errors import InvalidArgumentError, UnknownNameError
-from mcmj.gaits import GAITS, LEGS, gait_target
+from mcmj.gaits import GAITS, LEGS, NAMES, named_target
 from mcmj.lessons import Teaching
 from mcmj.library import body_names, body_path
 from mcmj.options import Options
 from mcmj.simulation import Simulation
-from mcmj.targets import TARGETS, Target, target
+from mcmj.targets import TARGETS, Target
 from mcmj.teaching import synchronise, teach
 from mcmj.trajectory import State
 from mcmj.validation import Array
@@ -89,16 +89,14 @@ def _read(name: str) -> tuple[Body, dict[str, Array]]:
     """A body, and the readouts (L or L + 1, n_outputs) in its file by task."""
     model = load_model(body_path(name))
     active, named = readout_of_model(model), readouts_of_model(model)
-    readouts = {task: w_out for task, w_out in named.items() if task in {*TARGETS, *GAITS}}
+    readouts = {task: w_out for task, w_out in named.items() if task in NAMES}
     if active is not None and "taught_inputs" in (provenance_of_model(model) or {}):
         readouts = dict.fromkeys(DRIVEN, active) | readouts
     return body_of_model(model), readouts
 
 
 def _target(task: str) -> Target:
-    if task in DRIVEN:
-        return QUADRATIC.cycle(DRIVEN[task])
-    return gait_target(task) if task in GAITS else target(task)
+    return QUADRATIC.cycle(DRIVEN[task]) if task in DRIVEN else named_target(task)
 
 
 @functools.cache

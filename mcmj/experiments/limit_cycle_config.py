@@ -39,7 +39,7 @@ class Config:
         free_run: length of the free run in closed loop [s].
         window: the errors are those of this last part of it [s].
         timestep: control and physics step [s].
-        integrator: one of MuJoCo's.
+        integrator: Euler, RK4, implicit, implicitfast, discrete or leapfrog.
         engine: mujoco, or twin: faster, the same to rounding, no video.
         windows: length of the consecutive windows of the free run whose errors are given too
             [s]; 0: none.
