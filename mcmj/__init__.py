@@ -27,13 +27,15 @@ from mcmj.bodyfile import from_mjcf  # noqa: E402
 from mcmj.ensemble import Ensemble  # noqa: E402
 from mcmj.errors import McmjError  # noqa: E402
 from mcmj.generator import random_body  # noqa: E402
+from mcmj.lessons import Teaching  # noqa: E402
 from mcmj.mjcf import to_mjcf  # noqa: E402
+from mcmj.phases import Phase, RandomForces, Schedule  # noqa: E402
 from mcmj.readout import fit_readout  # noqa: E402
-from mcmj.schedule import Phase, RandomForces, Schedule, run_schedule  # noqa: E402
+from mcmj.schedule import run_schedule  # noqa: E402
 from mcmj.simulation import Simulation  # noqa: E402
 from mcmj.spring_laws import SpringLaw  # noqa: E402
 from mcmj.targets import Target, target  # noqa: E402
-from mcmj.teaching import Teaching, teach  # noqa: E402
+from mcmj.teaching import teach  # noqa: E402
 
 __all__ = [
     "Body",

@@ -24,7 +24,7 @@ def certificate_figure(
     target_multipliers: Complex | None,
     starts: tuple[Array, Array],
     blows: Sequence[tuple[str, Array, Array, Array]],
-    tolerances: Sequence[tuple[str, dict[float, float]]],
+    tolerances: Sequence[tuple[str, Array, float, tuple[float, float]]],
     lines: Sequence[tuple[str, str]],
 ) -> Figure:
     """One page.
@@ -34,7 +34,8 @@ def certificate_figure(
         multipliers, target_multipliers: complex, of the body and of its target's system.
         starts: first outputs (B, n), and recovery times (B,) [s], infinite if lost.
         blows: per kind: axis label, strengths (K,), recovered and overflowed fractions (K,).
-        tolerances: per kind: axis label, amplitude -> fraction that recovered.
+        tolerances: per kind: label, largest amplitudes (B,) that copies recover from, their
+            median and its interval.
         lines: names and values of the text panel.
     """
     figure = new_figure(15.0, 8.6)
@@ -90,12 +91,18 @@ def _draw_blows(axes: Axes, label: str, strengths: Array, good: Array, blown: Ar
     axes.grid(alpha=0.3)
 
 
-def _draw_tolerances(axes: Axes, tolerances: Sequence[tuple[str, dict[float, float]]]) -> None:
-    for (label, tried), marker in zip(tolerances, "osd^", strict=False):
-        amplitudes = sorted(tried)
-        axes.semilogx(amplitudes, [tried[a] for a in amplitudes], f"{marker}-", ms=4, label=label)
-    axes.set(xlabel="amplitude for 10 s", ylabel="fraction recovered", ylim=(-0.05, 1.05))
-    axes.set_title("tolerances: steps of the bisections")
+def _draw_tolerances(
+    axes: Axes, tolerances: Sequence[tuple[str, Array, float, tuple[float, float]]]
+) -> None:
+    axes.set_xscale("log")
+    for row, (label, values, median, (low, high)) in enumerate(tolerances):
+        line = axes.ecdf(values, complementary=True, label=label)
+        if np.isfinite(high):
+            bar, y = [[median - low], [high - median]], 0.5 + 0.04 * (row - 1)
+            axes.errorbar(median, y, xerr=bar, fmt="o", ms=4, capsize=3, color=line.get_color())
+    axes.set(xlabel="amplitude for 10 s", ylabel="fraction that recovers")
+    axes.set(yticks=np.linspace(0, 1, 6), ylim=(-0.4, 1.05))  # room for the legend
+    axes.set_title("tolerances; medians with 95 % intervals")
     axes.legend(fontsize=8, loc="lower left")
     axes.grid(alpha=0.3)
 

@@ -1,11 +1,10 @@
 """Bodies and tasks as dm_control environments; needs the extra "control".
 
-The physics is dm_control's own Physics of the body file, with mcmj's compiled callback
+The physics is dm_control's own Physics of the body file, with mcmj's compiled callbacks
 installed: the feedback loop runs inside MuJoCo, and the agent acts beside it. The only module
 that imports dm_control.
 """
 
-import functools
 from collections import OrderedDict
 
 import numpy as np
@@ -17,16 +16,17 @@ from dm_env import specs
 
 from mcmj import laws
 from mcmj.body import Body
-from mcmj.bodyfile import body_of_model, load_model, readouts_of_model
 from mcmj.environment_setting import Setting
+from mcmj.environment_task import all_tasks as all_tasks
+from mcmj.environment_task import assign, state_on_cycle
 from mcmj.errors import InvalidArgumentError
-from mcmj.library import body_names, body_path
 from mcmj.mjcf import checked_readout, to_mjcf
+from mcmj.options import Options
 from mcmj.orbit_window import OrbitWindow
-from mcmj.simulation import Simulation
-from mcmj.targets import TARGETS, Target, target
-from mcmj.teaching import Teaching, synchronise, teach
-from mcmj.validation import Array
+from mcmj.steplimit import warn_if_unstable
+from mcmj.targets import Target
+from mcmj.trajectory import State
+from mcmj.validation import Array, as_array
 
 RUNAWAY_LENGTH, RUNAWAY_OUTPUT = 10.0, 100.0  # of the body's size and the target's
 
@@ -39,12 +39,13 @@ class Physics(mujoco.Physics):
     blew_up = False  # in this episode
 
     @classmethod
-    def of_body(cls, body: Body, w_out: object, timestep: float, gate: float) -> "Physics":
-        """A body with its readout (L or L + 1, n_outputs), the loop closed by `gate`."""
+    def of_body(cls, body: Body, w_out: object, setting: Setting) -> "Physics":
+        """A body with its readout (L or L + 1, n_outputs), stepped as the setting says."""
         readout = checked_readout(body, w_out)
-        laws.install()
-        physics = cls.from_xml_string(to_mjcf(body, timestep=timestep, w_out=readout))
-        physics.model.actuator_biasprm[body.n_inputs :, 0] = gate
+        laws.install(leapfrog=setting.leapfrog)
+        xml = to_mjcf(body, timestep=setting.timestep, integrator=setting.integrator, w_out=readout)
+        physics = cls.from_xml_string(xml)
+        physics.model.actuator_biasprm[body.n_inputs :, 0] = setting.gate
         physics.body, physics.w_out = body, readout
         return physics
 
@@ -53,6 +54,7 @@ class Physics(mujoco.Physics):
         before = self.get_state()
         try:
             super().step(n_sub_steps)
+            self.forward()  # the step leaves the lengths of its start
         except control.PhysicsError:
             self.blew_up = True
             self.set_state(before)
@@ -72,12 +74,14 @@ class Physics(mujoco.Physics):
 class Orbit(base.Task):
     """Generate a target's orbit; the agent acts on input channels and fed-back outputs.
 
-    Reward in [0, 1] from the orbit error of the last period (mcmj.orbit_window).
+    Reward in [0, 1] from the orbit error of the last period (mcmj.orbit_window). It says where
+    the outputs are, not how fast they go round.
 
     Args:
         target: the orbit; its value at each moment is observed too.
         setting: what the agent may do.
-        first: positions, velocities (N, 2) and time of an episode's start; None: rest.
+        inputs: (n_inputs,) that the agent's are added to.
+        first: an episode's start; None: rest.
         random: a seed or a RandomState, for the kick.
     """
 
@@ -86,17 +90,15 @@ class Orbit(base.Task):
         body: Body,
         target: Target,
         setting: Setting,
-        first: tuple[Array, Array, float] | None = None,
+        inputs: Array,
+        first: State | None = None,
         random: int | np.random.RandomState = 0,
     ) -> None:
         super().__init__(random=random)
         self.target, self.setting = target, setting
         self._first = first
-        limits = np.zeros(body.n_inputs + body.n_outputs)
-        if setting.actions != "offsets":
-            limits[: body.n_inputs] = setting.input_limit
-        if setting.actions != "inputs":
-            limits[body.n_inputs :] = setting.offset_limit
+        self._held = np.concatenate([inputs, np.zeros(body.n_outputs)])
+        limits = setting.limits(body)
         self._channels = np.flatnonzero(limits)
         self._limits = limits[self._channels]
         if not self._channels.size:
@@ -110,13 +112,14 @@ class Orbit(base.Task):
 
     def initialize_episode(self, physics: Physics) -> None:
         """Rest or a point of the cycle, kicked."""
-        laws.install()  # another package may have taken them out
+        laws.install(leapfrog=self.setting.leapfrog)  # another package may have taken them out
         free = physics.body.free
         velocities = self.setting.kick * self.random.standard_normal((len(free), 2))
         if self._first is not None:
-            positions, moving, physics.data.time = self._first
-            physics.data.qpos[:] = (positions - physics.body.positions)[free].ravel()
-            velocities += moving[free]
+            physics.data.time = self._first.time
+            moved = self._first.positions - physics.body.positions
+            physics.data.qpos[:] = moved[free].ravel()
+            velocities += self._first.velocities[free]
         physics.data.qvel[:] = velocities.ravel()
         physics.blew_up = False
         self._window.clear()
@@ -124,7 +127,8 @@ class Orbit(base.Task):
 
     def before_step(self, action: Array, physics: Physics) -> None:
         """Actions beyond their bounds are clipped."""
-        physics.data.ctrl[self._channels] = np.clip(action, -self._limits, self._limits)
+        physics.data.ctrl[:] = self._held
+        physics.data.ctrl[self._channels] += np.clip(action, -self._limits, self._limits)
 
     def after_step(self, physics: Physics) -> None:
         """Remember the outputs."""
@@ -181,26 +185,33 @@ def make(
     target: Target,
     setting: Setting | None = None,
     random: int | np.random.RandomState = 0,
+    *,
+    inputs: object = None,
 ) -> Environment:
     """An environment of a body with its readout.
 
     Args:
         w_out: (L or L + 1, n_outputs).
         random: a seed or a RandomState; the same seed gives the same episodes.
+        inputs: (n_inputs,) held all the time, that the agent's are added to; default: 0.
 
     Raises:
-        InvalidArgumentError: a readout, target or setting that does not fit the body.
+        InvalidArgumentError: a readout, target, input or setting that does not fit the body.
     """
     setting = setting or Setting()
     if body.n_outputs != target.n_outputs:
         raise InvalidArgumentError("body", f"{target.n_outputs} outputs", body.n_outputs)
-    physics = Physics.of_body(body, w_out, setting.timestep, setting.gate)
-    first = _on_cycle(body, target, setting.timestep) if setting.start == "cycle" else None
+    constant = np.zeros(body.n_inputs) if inputs is None else inputs
+    held = as_array("inputs", constant, (body.n_inputs,))
+    options = Options(setting.timestep, setting.integrator)
+    warn_if_unstable(body, options)
+    first = state_on_cycle(body, target, held, options) if setting.start == "cycle" else None
     return Environment(
-        physics,
-        Orbit(body, target, setting, first, random),
+        Physics.of_body(body, w_out, setting),
+        Orbit(body, target, setting, held, first, random),
         time_limit=setting.time_limit,
         control_timestep=setting.control_timestep,
+        legacy_step=False,  # whole steps: the leapfrog must know the action of a step it begins
     )
 
 
@@ -213,29 +224,14 @@ def load(
     """The environment of a body by its name, or of a body file, in the manner of the suite.
 
     Args:
-        name: a body that comes with mcmj, or a path; see `body_names`.
-        task: name of a target; default: what the file's first readout is called. Without a
-            readout for it in the file the body is taught it first.
-        setting, random: see `make`.
+        name, task: as for `mcmj.environment_task.assign`.
+        setting, random: as for `make`.
 
     Raises:
         UnknownNameError: no such body or task.
     """
-    body, readouts = _body_and_readouts(name)
-    task = task or next((kind for kind in readouts if kind in TARGETS), "van_der_pol")
-    wanted = target(task)
-    w_out = readouts[task] if task in readouts else _taught(name, task)
-    return make(body, w_out, wanted, setting, random)
-
-
-def all_tasks() -> list[tuple[str, str]]:
-    """Names of bodies that come with mcmj, and of tasks that their files hold readouts for."""
-    return [
-        (name, task)
-        for name in body_names()
-        for task in _body_and_readouts(name)[1]
-        if task in TARGETS
-    ]
+    given = assign(name, task)
+    return make(given.body, given.w_out, given.target, setting, random, inputs=given.inputs)
 
 
 def _observation_bounds(body: Body, wanted: Target) -> dict[str, tuple[Array, Array]]:
@@ -249,21 +245,3 @@ def _observation_bounds(body: Body, wanted: Target) -> dict[str, tuple[Array, Ar
         "outputs": (-largest, largest),
         "target": (low - slack, high + slack),
     }
-
-
-def _body_and_readouts(name: str) -> tuple[Body, dict[str, Array]]:
-    model = load_model(body_path(name))
-    return body_of_model(model), readouts_of_model(model)
-
-
-@functools.cache
-def _taught(name: str, task: str) -> Array:
-    simulation = Simulation(_body_and_readouts(name)[0])
-    return teach(simulation, target(task), Teaching(), seed=0).w_out
-
-
-def _on_cycle(body: Body, wanted: Target, timestep: float) -> tuple[Array, Array, float]:
-    simulation = Simulation(body, timestep=timestep)
-    synchronise(simulation, wanted, Teaching().washout)
-    state = simulation.state
-    return state.positions, state.velocities, state.time

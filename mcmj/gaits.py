@@ -18,7 +18,7 @@ import numpy as np
 from scipy.special import expit
 
 from mcmj.errors import UnknownNameError
-from mcmj.targets import Target, from_array, limit_cycle
+from mcmj.targets import TARGETS, Target, from_array, limit_cycle, target
 from mcmj.validation import Array, as_array, require_number
 
 LEGS = ("LF", "RF", "LH", "RH")  # left and right, fore and hind
@@ -107,6 +107,7 @@ GAITS: dict[str, Gait] = {
         ),
     )
 }  # fmt: skip
+NAMES = (*TARGETS, *GAITS)
 
 
 @functools.cache
@@ -119,3 +120,14 @@ def gait_target(name: str) -> Target:
     if name not in GAITS:
         raise UnknownNameError("gait", name, GAITS)
     return GAITS[name].target()
+
+
+def named_target(name: str) -> Target:
+    """A limit cycle of mcmj.targets or a gait: one of NAMES.
+
+    Raises:
+        UnknownNameError: neither.
+    """
+    if name not in NAMES:
+        raise UnknownNameError("target", name, NAMES)
+    return gait_target(name) if name in GAITS else target(name)

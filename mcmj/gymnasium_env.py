@@ -25,7 +25,7 @@ class OrbitEnv(gymnasium.Env[dict[str, Any], Array]):
         render_mode: None or "rgb_array".
     """
 
-    metadata = {"render_modes": ["rgb_array"], "render_fps": 50}  # noqa: RUF012  (Gymnasium's)
+    metadata: dict[str, Any] = {"render_modes": ["rgb_array"]}  # noqa: RUF012  (Gymnasium's)
 
     def __init__(
         self,
@@ -38,6 +38,8 @@ class OrbitEnv(gymnasium.Env[dict[str, Any], Array]):
     ) -> None:
         self.environment = environment or load(name, task, setting)
         self.render_mode = render_mode
+        frames = round(1 / self.environment.control_timestep())
+        self.metadata = {**self.metadata, "render_fps": frames}
         action = self.environment.action_spec()
         self.action_space = spaces.Box(action.minimum, action.maximum, action.shape, np.float64)
         self.observation_space: spaces.Dict = spaces.Dict(

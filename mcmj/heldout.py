@@ -5,11 +5,11 @@ from collections.abc import Sequence
 import numpy as np
 
 from mcmj.errors import DivergenceError
+from mcmj.lessons import Teaching
 from mcmj.metrics import orbit_error
 from mcmj.simulation import Simulation
 from mcmj.streams import stream
 from mcmj.targets import Target
-from mcmj.teaching import Teaching
 from mcmj.validation import Array, require_count
 
 

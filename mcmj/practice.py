@@ -16,11 +16,12 @@ import numpy as np
 
 from mcmj import metrics
 from mcmj.errors import DivergenceError, InvalidArgumentError
+from mcmj.lessons import Lesson
 from mcmj.progress import OnSteps
 from mcmj.readout import Fit
 from mcmj.simulation import Simulation
 from mcmj.targets import Target
-from mcmj.teaching import Course, Lesson
+from mcmj.teaching import Course
 from mcmj.validation import Array, require_count, require_number
 
 Judge = Callable[[Array], float]

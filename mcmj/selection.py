@@ -11,9 +11,10 @@ import numpy as np
 
 from mcmj.errors import DivergenceError
 from mcmj.heldout import closed_loop_errors, held_out_starts
+from mcmj.lessons import Teaching
 from mcmj.simulation import Simulation
 from mcmj.targets import Target
-from mcmj.teaching import Course, Teaching, lessons_of
+from mcmj.teaching import Course, lessons_of
 from mcmj.validation import Array, require_count, require_number
 
 NOISES = (0.02, 0.05, 0.1, 0.2, 0.4)

@@ -15,6 +15,8 @@ from mcmj.experiments.certify import STAGES, Result, run
 from mcmj.experiments.certify_config import Config
 from mcmj.progress import progress_bar
 from mcmj.stability.basin import Survey
+from mcmj.stability.phase import Diffusion
+from mcmj.stability.tolerance import Tolerance
 
 
 def work(config: Config, output: Output, out: Path) -> None:
@@ -39,9 +41,12 @@ def figure(result: Result):
             ("random forces for 1 s, F [N]", *levels(config.pushes, result.pushes)),
         ],
         tolerances=[
-            ("forces [N], own step", result.force.tried),
-            ("forces [N], refined steps", result.force_fine.tried),
-            ("noise on lengths [m]", result.noise.tried),
+            (label, one.values, one.median, one.interval)
+            for label, one in (
+                ("forces [N], own step", result.force),
+                ("forces [N], refined steps", result.force_fine),
+                ("noise on lengths [m]", result.noise),
+            )
         ],
         lines=lines(result),
     )
@@ -71,18 +76,27 @@ def lines(result: Result) -> list[tuple[str, str]]:
         ("two methods differ by", f"{floquet.disagreement:.1e}"),
         ("MuJoCo differs by", f"{result.mujoco_monodromy_error:.1e}"),
         ("largest Lyapunov exponent", f"{result.exponent.value:.1e} 1/s"),
-        ("phase jitter per period", f"{result.diffusion.jitter:.1e}"),
+        ("phase jitter per period", plus_minus(result.diffusion)),
         ("  at noise on lengths", f"{result.diffusion.noise:g} m"),
         ("cycle closes to (RMS, relative)", f"{result.cycle.residual:.1e}"),
         ("from total rest", "recovers" if result.rest_recovers else "does not recover"),
         ("starts that recover", f"{100 * result.starts.fraction:.1f} %"),
         ("  median, longest time", f"{np.median(times):.1f} s, {times.max():.1f} s"
          if times.size else "none"),
-        ("force tolerance (10 s)", f"{result.force_fine.value:.3g} N"),
-        ("  at the body's own step", f"{result.force.value:.3g} N"),
-        ("length noise tolerance (10 s)", f"{result.noise.value:.3g} m"),
+        ("median force tolerance", over_copies(result.force_fine, "N")),
+        ("  at the body's own step", over_copies(result.force, "N")),
+        ("median noise tolerance", over_copies(result.noise, "m")),
         ("pushes judged alike by MuJoCo", f"{agreeing} of {of}"),
     ]  # fmt: skip
+
+
+def over_copies(tolerance: Tolerance, unit: str) -> str:
+    low, high = tolerance.interval
+    return f"{tolerance.median:.3g} ({low:.3g} .. {high:.3g}) {unit}"
+
+
+def plus_minus(diffusion: Diffusion) -> str:
+    return f"{diffusion.jitter:.1e} +- {100 * diffusion.jitter_error / diffusion.jitter:.0f} %"
 
 
 def show(result: Result, out: Path) -> None:

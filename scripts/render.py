@@ -12,9 +12,9 @@ from rich.console import Console
 from mcmj import store
 from mcmj.cli import Output, main
 from mcmj.experiments.render import Config, run
+from mcmj.lessons import Teaching
 from mcmj.progress import progress_bar
 from mcmj.rendering import write_film
-from mcmj.teaching import Teaching
 
 NAME = "film"
 

@@ -1,8 +1,11 @@
 import numpy as np
 import pytest
 from hypothesis import settings
+from rollouts import T
 
 import mcmj
+from mcmj.stability.cycle import find_cycle
+from mcmj.stability.loop import ClosedLoop
 
 # compiling models takes milliseconds to seconds; every run tries the same examples
 settings.register_profile("mcmj", deadline=None, max_examples=40, derandomize=True)
@@ -45,3 +48,26 @@ def oscillator():
         fixed=[True, False],
         masses=[1.0, 2.0],
     )
+
+
+@pytest.fixture(scope="session")
+def taught_loop():
+    """A body taught Van der Pol as a closed loop, its cycle, and the target."""
+    body, goal = mcmj.random_body(seed=0), mcmj.target("van_der_pol")
+    simulation = mcmj.Simulation(body)
+    fit = mcmj.teach(simulation, goal, mcmj.Teaching(duration=60.0), 0)
+    loop = ClosedLoop(body, fit.w_out)
+    cycle = find_cycle(loop, loop.vector(simulation.state), goal.period, settle=60.0)
+    return loop, cycle, goal
+
+
+@pytest.fixture(scope="session")
+def drive(body):
+    """Everything that can push, over T steps."""
+    rng = np.random.default_rng(3)
+    return {
+        "inputs": rng.normal(size=(T, body.n_inputs)),
+        "offset": rng.normal(size=(T, body.n_outputs)),
+        "gate": np.array([1.0, 0.4]),
+        "forces": 5 * rng.normal(size=(T, body.n_nodes)),
+    }

@@ -1,28 +1,22 @@
-"""Bodies as dm_control and Gymnasium environments: contract, physics, reward, determinism."""
+"""Environments: their physics, actions, reward and determinism."""
+
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 pytest.importorskip("dm_control", reason="the extra 'control' is not installed")
 
-from absl.testing import absltest
-from dm_env import test_utils
-
 import mcmj
 from mcmj import environment, metrics
 from mcmj.environment import Setting
-from mcmj.errors import InvalidArgumentError, UnknownNameError
+from mcmj.errors import InvalidArgumentError, StabilityWarning, UnknownNameError
 from mcmj.experiments import drive
+from mcmj.mjcf import INTEGRATORS
 from mcmj.orbit_window import OrbitWindow
+from mcmj.teaching import synchronise
 
 SHORT = Setting(time_limit=0.2)
-
-
-class ContractTest(test_utils.EnvironmentTestMixin, absltest.TestCase):
-    """dm_env's own test of the interface; episodes of 10 control steps end within it."""
-
-    def make_object_under_test(self):
-        return environment.load("van_der_pol", setting=SHORT, random=0)
 
 
 @pytest.fixture(scope="module")
@@ -39,11 +33,14 @@ def actions_of(env, count, seed=0):
     return np.random.default_rng(seed).uniform(spec.minimum, spec.maximum, (count, *spec.shape))
 
 
-def test_the_physics_is_our_closed_loop(one):
-    physics, actions = one.physics, actions_of(one, 30)
-    steps = [one.reset(), *(one.step(action) for action in actions)]
+@pytest.mark.parametrize("integrator", INTEGRATORS)
+def test_the_physics_is_our_closed_loop(one, integrator):
+    physics, setting = one.physics, replace(one.task.setting, integrator=integrator)
+    env = environment.make(physics.body, physics.w_out, one.task.target, setting)
+    actions = actions_of(env, 30)
+    steps = [env.reset(), *(env.step(action) for action in actions)]
     held = np.repeat(actions, 20, axis=0)
-    simulation = mcmj.Simulation(physics.body, w_out=physics.w_out)
+    simulation = mcmj.Simulation(physics.body, w_out=physics.w_out, integrator=integrator)
     run = simulation.rollout(inputs=held[:, :2], offset=held[:, 2:])
     end = simulation.rollout(1)
     seen = np.array([step.observation["lengths"] for step in steps])
@@ -52,6 +49,24 @@ def test_the_physics_is_our_closed_loop(one):
     assert np.abs(wanted - wanted[0]).max() > 0.1  # it did move
     outputs = np.array([step.observation["outputs"] for step in steps])
     assert np.abs(outputs - np.vstack([run.outputs[::20], end.outputs])).max() < 2e-14
+
+
+@pytest.mark.parametrize("integrator", ["RK4", "leapfrog"])
+def test_an_episode_on_the_cycle_goes_on_under_its_integrator(one, integrator):
+    """As a Simulation does that is put there, without action, constant input held."""
+    body, w_out, wanted = one.physics.body, one.physics.w_out, one.task.target
+    setting = replace(one.task.setting, integrator=integrator, start="cycle")
+    env = environment.make(body, w_out, wanted, setting, inputs=[0.3, -0.2])
+    steps = [env.reset(), *(env.step(np.zeros(4)) for _ in range(10))]
+    simulation = mcmj.Simulation(body, integrator=integrator)
+    synchronise(simulation, wanted, 20.0, [0.3, -0.2])
+    simulation.set_readout(w_out)
+    state = simulation.state
+    simulation.set_state(state.positions, state.velocities)
+    run = simulation.rollout(inputs=np.tile([0.3, -0.2], (201, 1)))
+    seen = np.array([step.observation["lengths"] for step in steps])
+    assert np.array_equal(seen, run.lengths[::20])
+    assert np.abs(seen - seen[0]).max() > 0.01
 
 
 def test_the_gate_opens_the_loop(one):
@@ -130,14 +145,6 @@ def test_a_body_that_is_lost_ends_the_episode(one, weight):
     assert not env.physics.blew_up
 
 
-def test_every_body_with_a_readout_is_a_task():
-    names = environment.all_tasks()
-    assert ("quadratic", "quadratic") in names
-    for name, task in names:
-        env = environment.load(name, task, SHORT, random=0)
-        assert np.isfinite(env.step(None).observation["outputs"]).all()
-
-
 def test_what_does_not_fit_is_said(one):
     with pytest.raises(UnknownNameError, match=r"valid choices: .*quadratic"):
         environment.load("nobody")
@@ -147,20 +154,16 @@ def test_what_does_not_fit_is_said(one):
         environment.load("quadratic", setting=Setting(actions="inputs"))
     with pytest.raises(InvalidArgumentError, match="w_out"):
         environment.make(one.physics.body, np.zeros((3, 2)), mcmj.target("lissajous"))
-
-
-def test_gymnasium_checks_the_environment():
-    gymnasium = pytest.importorskip("gymnasium", reason="the extra 'gym' is not installed")
-    from gymnasium.utils.env_checker import check_env
-
-    env = gymnasium.make("mcmj.gymnasium_env:mcmj/Orbit-v0", name="van_der_pol", setting=SHORT)
-    check_env(env.unwrapped)
-    observation, _ = env.reset(seed=4)
-    ends = [env.step(env.action_space.sample())[2:4] for _ in range(10)]
-    assert ends == [(False, False)] * 9 + [(False, True)]
-    again, _ = env.reset(seed=4)
-    assert all(np.array_equal(observation[key], again[key]) for key in observation)
-    env.close()
+    with pytest.raises(UnknownNameError, match="integrator 'Verlet'; valid choices: Euler, RK4, "):
+        Setting(integrator="Verlet")
+    with pytest.raises(InvalidArgumentError, match="control_timestep: expected a multiple of"):
+        Setting(control_timestep=0.0205)
+    body, w_out = one.physics.body, one.physics.w_out
+    with pytest.raises(InvalidArgumentError, match="inputs: expected shape \\(2\\)"):
+        environment.make(body, w_out, mcmj.target("lissajous"), inputs=[1.0])
+    coarse = Setting(timestep=0.5, control_timestep=0.5, integrator="leapfrog")
+    with pytest.warns(StabilityWarning, match="integrator leapfrog"):
+        environment.make(body, w_out, mcmj.target("lissajous"), coarse)
 
 
 def test_the_cross_entropy_method_finds_better_inputs():

@@ -11,9 +11,9 @@ from mcmj.experiments import gaits
 from mcmj.experiments.gaits_config import Config, get_body
 from mcmj.gaits import GAITS, gait_target
 from mcmj.generator import BodySettings
+from mcmj.lessons import Teaching
 from mcmj.library import body_names, body_path
 from mcmj.practice import Practice
-from mcmj.teaching import Teaching
 
 SMALL = BodySettings(nodes=20, n_outputs=4)
 QUICK = Config(

@@ -17,6 +17,7 @@ from mcmj.experiments import input_driven, input_lessons
 from mcmj.experiments.input_driven_config import Config, get_start
 from mcmj.experiments.input_sweep import Branch, Sweep, branches
 from mcmj.generator import BodySettings, draw_body
+from mcmj.lessons import Lesson, Teaching
 from mcmj.practice import Practice
 from mcmj.profiles import Profile
 from mcmj.readout import fit_readout
@@ -24,7 +25,7 @@ from mcmj.rhythm import cycles
 from mcmj.simulation import Simulation
 from mcmj.streams import stream
 from mcmj.targets import quadratic
-from mcmj.teaching import Lesson, Teaching, teach_lessons
+from mcmj.teaching import teach_lessons
 
 SMALL = BodySettings(nodes=20, n_inputs=1, input_scale=2.0, feedback_fraction=1.0)
 QUICK = Config(

@@ -31,6 +31,7 @@ LEVELS = (
     ("engine",),
     ("simulation",),
     ("ensemble",),
+    ("lessons",),
     ("teaching",),
 )
 CHAINS = (
@@ -43,7 +44,10 @@ CHAINS = (
     (("metrics",), ("gaitmetrics",)),
     (("gaitmetrics",), ("gaitplot",)),
     (("validation",), ("readout",)),
-    (("readout", "targets"), ("teaching",)),
+    (("readout", "targets", "lessons"), ("teaching",)),
+    (("phases",), ("schedule",)),
+    (("experiments.benchmark_config",), ("experiments.benchmark_process",)),
+    (("experiments.benchmark_process",), ("experiments.benchmark",)),
     (("errors",), ("store",)),
     (("teaching", "metrics"), ("heldout",)),
     (("heldout",), ("selection",)),
@@ -60,6 +64,7 @@ CHAINS = (
     (("theory", "capacity", "filter_tasks"), ("probing",)),
     (("targets", "profiles"), ("driven",)),
     (("teaching", "driven"), ("experiments.input_lessons",)),
+    (("environment_setting", "environment_task"), ("environment",)),
 )
 MUJOCO = {
     "alteration",

@@ -8,11 +8,12 @@ import twins
 
 from mcmj import Simulation, Teaching, random_body, teach
 from mcmj.errors import DivergenceError, InvalidArgumentError
+from mcmj.lessons import Lesson
 from mcmj.metrics import orbit_error
 from mcmj.practice import Exercise, Practice, practise, practise_exercises
 from mcmj.streams import stream
 from mcmj.targets import target
-from mcmj.teaching import Course, Lesson, lessons_of
+from mcmj.teaching import Course, lessons_of
 
 STEP = 2e-3
 TAUGHT = Teaching(duration=20.0, washout=5.0, rest_runs=1, rest_duration=5.0, noise=0.1)

@@ -8,9 +8,9 @@ import pytest
 from mcmj.errors import UnknownNameError
 from mcmj.experiments import prune
 from mcmj.generator import BodySettings
+from mcmj.lessons import Teaching
 from mcmj.pruning import importance, sense_only
 from mcmj.readout import Regression, fit_readout
-from mcmj.teaching import Teaching
 
 
 def problem(seed, *, springs=7, rows=200, bias=False):

@@ -8,9 +8,10 @@ import pytest
 import mcmj
 from mcmj.errors import DivergenceError
 from mcmj.heldout import closed_loop_errors, held_out_starts
+from mcmj.lessons import Teaching
 from mcmj.metrics import orbit_error
 from mcmj.selection import select_teaching
-from mcmj.teaching import Teaching, synchronise, teach
+from mcmj.teaching import synchronise, teach
 
 GOAL = mcmj.target("quadratic")
 TEACHING = Teaching(duration=50.0)

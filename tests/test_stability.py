@@ -1,4 +1,4 @@
-"""Multipliers, exponents and tolerances in cases that are known, and of a small taught body."""
+"""Multipliers, exponents and blows in cases that are known, and of a small taught body."""
 
 import numpy as np
 import pytest
@@ -14,8 +14,6 @@ from mcmj.stability.cycle import find_cycle, flow_map, weights_at
 from mcmj.stability.floquet import differences, floquet, jacobian, multipliers, target_multipliers
 from mcmj.stability.loop import ClosedLoop
 from mcmj.stability.lyapunov import lyapunov_exponent
-from mcmj.stability.phase import phase_diffusion
-from mcmj.stability.tolerance import force_tolerance, largest_tolerated, noise_tolerance
 from mcmj.stability.variational import step_jacobian, variational
 
 
@@ -31,17 +29,6 @@ def cross(damping):
         d3=[0.0] * 4,
         fixed=[False, True, True, True, True],
     )
-
-
-@pytest.fixture(scope="module")
-def taught():
-    """A closed loop, its cycle, and what it was taught."""
-    body, goal = mcmj.random_body(seed=0), mcmj.target("van_der_pol")
-    simulation = mcmj.Simulation(body)
-    fit = mcmj.teach(simulation, goal, mcmj.Teaching(duration=60.0), 0)
-    loop = ClosedLoop(body, fit.w_out)
-    cycle = find_cycle(loop, loop.vector(simulation.state), goal.period, settle=60.0)
-    return loop, cycle, goal
 
 
 # --- the target systems ----------------------------------------------------------------------
@@ -166,8 +153,8 @@ def test_interpolation_between_steps_is_exact_for_cubics(fraction):
 
 
 @pytest.mark.slow
-def test_two_methods_and_mujoco_agree_on_a_stable_cycle(taught):
-    loop, cycle, _ = taught
+def test_two_methods_and_mujoco_agree_on_a_stable_cycle(taught_loop):
+    loop, cycle, _ = taught_loop
     found = floquet(loop, cycle)
     assert cycle.residual < 1e-6
     assert found.disagreement < 1e-5
@@ -180,25 +167,23 @@ def test_two_methods_and_mujoco_agree_on_a_stable_cycle(taught):
 
 
 @pytest.mark.slow
-def test_multipliers_do_not_hang_on_the_width_of_differences(taught):
-    loop, cycle, _ = taught
+def test_multipliers_do_not_hang_on_the_width_of_differences(taught_loop):
+    loop, cycle, _ = taught_loop
     sets = [multipliers(differences(loop, cycle, eps))[0][:2] for eps in (3e-4, 1e-4, 3e-5)]
     np.testing.assert_allclose(sets[0], sets[1], atol=1e-4)
     np.testing.assert_allclose(sets[2], sets[1], atol=1e-4)
 
 
 @pytest.mark.slow
-def test_exponent_of_a_cycle_is_zero_and_phase_variance_grows_with_noise_squared(taught):
-    loop, cycle, _ = taught
+def test_exponent_of_a_cycle_is_zero(taught_loop):
+    loop, cycle, _ = taught_loop
     found = lyapunov_exponent(loop, cycle.state, interval=cycle.period, scale=cycle.scale)
     assert abs(found.value) < 1e-3
-    small, large = (phase_diffusion(loop, cycle, noise) for noise in (1e-5, 1e-4))
-    assert large.coefficient == pytest.approx(100 * small.coefficient, rel=0.05)
 
 
 @pytest.mark.slow
-def test_small_blows_are_recovered_from_and_the_bisections_end_between_bounds(taught):
-    loop, cycle, goal = taught
+def test_small_blows_are_recovered_from_and_huge_ones_are_not(taught_loop):
+    loop, cycle, goal = taught_loop
     states = on_cycle(loop, cycle, 4)
     weak = kicked(loop, cycle, np.full(4, 0.1), np.random.default_rng(0))
     assert survey(loop, goal, weak, duration=30.0).fraction == 1.0
@@ -208,20 +193,6 @@ def test_small_blows_are_recovered_from_and_the_bisections_end_between_bounds(ta
     lost = survey(loop, goal, after, duration=30.0)
     assert lost.blown.all()
     assert np.isinf(lost.times).all()
-    for bisect in (force_tolerance, noise_tolerance):
-        found = bisect(loop, goal, states, recovery=30.0, ratio=2.0)
-        assert 0 < found.value < found.failed <= 2.0001 * found.value
-        again = bisect(loop, goal, states, recovery=30.0, ratio=2.0)
-        assert again.tried == found.tried
-
-
-def test_bisection_finds_a_threshold_and_says_when_there_is_none():
-    found = largest_tolerated(lambda a: float(a < 3.0), 0.01, 100.0, ratio=1.01)
-    assert found.value <= 3.0 <= found.failed <= 1.01 * found.value * (1 + 1e-12)
-    assert largest_tolerated(lambda a: 0.0, 1.0, 2.0).value == 0.0
-    assert largest_tolerated(lambda a: 1.0, 1.0, 2.0).failed == np.inf
-    with pytest.raises(InvalidArgumentError, match="ratio"):
-        largest_tolerated(lambda a: 1.0, 1.0, 2.0, ratio=1.0)
 
 
 # --- the certificate -------------------------------------------------------------------------
@@ -244,9 +215,9 @@ def test_a_certificate_is_complete_and_its_numbers_are_those_of_its_parts():
     assert table["mujoco_monodromy_error"] < 1e-5
     assert table["leading_nontrivial"] < 0.2
     assert table["mujoco_pushes_agreeing"] == [1, 1]
-    tried = table["tolerances_tried"]["forces"]
-    held = [row["amplitude"] for row in tried if row["recovered"] == 1.0]
-    assert table["force_tolerance"] in held
+    assert len(table["force_tolerance_by_copy"]) == BRIEF.copies
+    assert 0 < table["force_tolerance_least"] <= table["force_tolerance"]
+    assert 0 < table["phase_jitter_standard_error"] < 0.1 * table["phase_jitter_per_period"]
     assert result.starts.times.shape == (4,)
 
 

@@ -3,10 +3,11 @@
 from collections.abc import Sequence
 
 from mcmj.body import Body
+from mcmj.lessons import Teaching
 from mcmj.metrics import orbit_error
 from mcmj.simulation import Simulation
 from mcmj.targets import TARGETS, target
-from mcmj.teaching import Teaching, synchronise, teach
+from mcmj.teaching import synchronise, teach
 
 INTEGRATORS = ("Euler", "leapfrog", "RK4")
 

@@ -1,9 +1,5 @@
 """All speed claims in one place: ratios measured side by side, medians of several rounds."""
 
-import os
-import platform
-import subprocess
-import sys
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -14,43 +10,15 @@ import numpy as np
 from mcmj.body import Body
 from mcmj.drive import check_drive
 from mcmj.ensemble import Ensemble
-from mcmj.errors import InvalidArgumentError
+from mcmj.experiments.benchmark_config import Config, small_readout
+from mcmj.experiments.benchmark_process import machine, memory, start_up
 from mcmj.experiments.full_scene import full_scene
 from mcmj.generator import random_body
 from mcmj.simulation import Simulation
 from mcmj.timing import Work, interleaved_seconds, median_ratio
 from mcmj.twin.population import Population
-from mcmj.validation import Array, require_count
 
 BATCH = 64  # bodies in one call of the twin
-READOUT_SIZE = 1e-4  # small weights: what they are costs nothing, and the loop stays quiet
-
-
-@dataclass(frozen=True)
-class Config:
-    """What to measure.
-
-    Attributes:
-        nodes: size of the body of most measurements.
-        sizes: numbers of nodes of the growth curves.
-        steps: control steps of each measured piece of work.
-        repeats: rounds, of which the median counts.
-        seed: of the bodies.
-        memory_steps: length of the run whose peak memory is measured; 0: leave it out.
-    """
-
-    nodes: int = 30
-    sizes: tuple[int, ...] = (10, 30, 100, 300, 1000, 3000)
-    steps: int = 2000
-    repeats: int = 9
-    seed: int = 0
-    memory_steps: int = 1_000_000
-
-    def __post_init__(self) -> None:
-        for name, low in (("nodes", 3), ("steps", 10), ("repeats", 1), ("memory_steps", 0)):
-            require_count(name, getattr(self, name), low)
-        if not self.sizes or min(self.sizes) < 3:
-            raise InvalidArgumentError("sizes", "numbers of nodes >= 3", self.sizes)
 
 
 @dataclass(frozen=True)
@@ -69,16 +37,6 @@ def run(config: Config, *, on_parts: Callable[[int], object] = lambda parts: Non
         metrics.update(part(config, body))
         on_parts(1)
     return Result(config, metrics)
-
-
-def machine() -> dict[str, object]:
-    """What it ran on, and how busy that was."""
-    return {
-        "platform": platform.platform(),
-        "processor": _processor_name(),
-        "cores": os.cpu_count(),
-        "load_average_1min": os.getloadavg()[0],
-    }
 
 
 def loop_costs(config: Config, body: Body) -> dict[str, object]:
@@ -186,23 +144,6 @@ def scene_costs(config: Config, body: Body) -> dict[str, object]:
     return {"full_scene_ratio": median_ratio(seconds, "full", "minimal")}
 
 
-def start_up(config: Config, body: Body) -> dict[str, object]:
-    """Seconds to import, and to import and install the callbacks from Numba's cache."""
-    snippets = {
-        "import_seconds": "import mcmj",
-        "import_and_callbacks_seconds": "from mcmj import laws; laws.install(springs=True)",
-    }
-    seconds = interleaved_seconds(
-        {
-            name: lambda code=code: subprocess.run([sys.executable, "-c", code], check=True)  # type: ignore[misc]
-            for name, code in {"empty": "pass", **snippets}.items()
-        },
-        repeats=3,
-    )
-    empty = float(np.median(seconds["empty"]))
-    return {name: float(np.median(seconds[name])) - empty for name in snippets}
-
-
 def growth(config: Config, body: Body) -> dict[str, object]:
     """Step time, twin's step time and compile time against the size of the body."""
     rows = []
@@ -232,29 +173,7 @@ def growth(config: Config, body: Body) -> dict[str, object]:
     return {"growth": rows}
 
 
-def memory(config: Config, body: Body) -> dict[str, object]:
-    """Peak resident memory of a process that streams a long closed-loop run, in MB."""
-    if config.memory_steps == 0:
-        return {"million_step_peak_mb": None}
-    code = (
-        "import numpy as np, mcmj\n"
-        f"body = mcmj.random_body({config.seed}, {config.nodes})\n"
-        f"sim = mcmj.Simulation(body, w_out=np.full((body.n_springs, 2), {READOUT_SIZE}))\n"
-        f"n = sum(len(c.lengths) for c in sim.stream({config.memory_steps}))\n"
-        f"assert n == {config.memory_steps}\n"
-        # not ru_maxrss, which counts the parent's memory at the fork
-        "print(next(int(x.split()[1]) for x in open('/proc/self/status') if 'VmHWM' in x) / 1024)"
-    )
-    done = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True)
-    return {"million_step_peak_mb": float(done.stdout)}
-
-
 PARTS = (loop_costs, twin_costs, thread_speedups, scene_costs, start_up, growth, memory)
-
-
-def small_readout(body: Body) -> Array:
-    """A readout (L, n_outputs) that closes the loop and does next to nothing."""
-    return np.full((body.n_springs, body.n_outputs), READOUT_SIZE)
 
 
 def _population(bodies: list[Body], **options: object) -> Population:
@@ -273,12 +192,3 @@ def _twin_work(population: Population, steps: int, *, lengths: bool = True) -> W
         closed=True,
     )
     return lambda: population.run(drive, 0, steps, lengths=lengths)
-
-
-def _processor_name() -> str:
-    try:
-        with open("/proc/cpuinfo") as file:
-            names = [line.split(":", 1)[1].strip() for line in file if "model name" in line]
-        return names[0] if names else platform.processor()
-    except OSError:
-        return platform.processor()

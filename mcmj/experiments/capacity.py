@@ -54,7 +54,7 @@ class Config:
         map_symbols: symbols of each of the maps' bodies.
         stiffness, damping: factors on k1 and k3, on d1 and d3, of the first map.
         sizes, strengths: nodes, and strengths, of the second map.
-        integrator: mcmj's name.
+        integrator: Euler, RK4, implicit, implicitfast, discrete or leapfrog.
         threads: results do not depend on them.
         settings: what the body is drawn from.
     """

@@ -51,8 +51,8 @@ class Result:
         start_outputs: (B, n_outputs) of the starts' states.
         rest_recovers: whether the loop comes to the orbit from total rest.
         mujoco_agrees: of a sample of pushes: how many MuJoCo judges as the twin does, of how many.
-        force, force_fine: tolerance at the body's own step, where Euler may fail before the body
-            does, and with `refine`.
+        force, force_fine, noise: tolerances of the copies: at the body's own step, where Euler
+            may fail before the body does, and with `refine`; of noise on the lengths.
     """
 
     config: Config
@@ -103,15 +103,11 @@ class Result:
             "lyapunov_spread": self.exponent.spread,
             "phase_diffusion": self.diffusion.coefficient,
             "phase_jitter_per_period": self.diffusion.jitter,
+            "phase_jitter_standard_error": self.diffusion.jitter_error,
             "phase_diffusion_noise": self.diffusion.noise,
-            "force_tolerance": self.force_fine.value,
-            "force_tolerance_own_step": self.force.value,
-            "noise_tolerance": self.noise.value,
-            "tolerances_tried": {
-                "forces": _tried(self.force_fine),
-                "forces_own_step": _tried(self.force),
-                "noise": _tried(self.noise),
-            },
+            **_tolerances("force_tolerance", self.force_fine),
+            **_tolerances("force_tolerance_own_step", self.force),
+            **_tolerances("noise_tolerance", self.noise),
         }
 
 
@@ -217,9 +213,14 @@ def _cycle(config: Config, goal: Target, loop: ClosedLoop, start: Array) -> Cycl
     return cycle
 
 
-def _tried(tolerance: Tolerance) -> list[dict[str, float]]:
-    """Fractions recovered at the amplitudes that a bisection tried."""
-    return [{"amplitude": a, "recovered": tolerance.tried[a]} for a in sorted(tolerance.tried)]
+def _tolerances(name: str, tolerance: Tolerance) -> dict[str, object]:
+    """The median over the copies, its interval, the weakest copy, and all of them."""
+    return {
+        name: tolerance.median,
+        f"{name}_interval_95": list(tolerance.interval),
+        f"{name}_least": tolerance.least,
+        f"{name}_by_copy": np.sort(tolerance.values),
+    }
 
 
 def _survey(config: Config, loop: ClosedLoop, goal: Target, states: Array) -> Survey:

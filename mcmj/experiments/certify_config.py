@@ -5,8 +5,8 @@ from dataclasses import dataclass, field
 from mcmj import metrics
 from mcmj.errors import UnknownNameError
 from mcmj.experiments import limit_cycle
+from mcmj.lessons import Teaching
 from mcmj.targets import TARGETS, target
-from mcmj.teaching import Teaching
 from mcmj.validation import as_array, require_above, require_count, require_number
 
 
@@ -27,7 +27,7 @@ class Config:
         phases: at which it lets go, for each scale.
         kicks: RMS velocity kicks, in units of the nodes' RMS speed on the cycle.
         pushes: amplitudes F of random constant forces in [-F, F] for 1 s [N].
-        copies: of each kick and push, and of each step of the tolerances' bisections.
+        copies: of each kick and push, and of the tolerances.
         refine: steps so much smaller for a second after a kick, and during a push.
         diffusion_noise: on the lengths, for the phase diffusion [m].
         teaching: how the readout is taught, if it is.

@@ -16,11 +16,12 @@ from mcmj.body import Body
 from mcmj.environment_setting import Setting
 from mcmj.errors import UnknownNameError
 from mcmj.generator import random_body
+from mcmj.lessons import Teaching
 from mcmj.progress import OnSteps
 from mcmj.simulation import Simulation
 from mcmj.streams import stream
 from mcmj.targets import TARGETS, Target, target
-from mcmj.teaching import Teaching, teach
+from mcmj.teaching import teach
 from mcmj.validation import Array, require_count, require_number
 
 if TYPE_CHECKING:

@@ -55,7 +55,7 @@ class Config:
         volterra_gain: the same for the Volterra task, whose input is a fifth as large.
         delay: of delayed_recall [symbols].
         taps: delays of the input that the baseline has, the present among them.
-        integrator: mcmj's name.
+        integrator: Euler, RK4, implicit, implicitfast, discrete or leapfrog.
         engine: mujoco, or twin for quick looks.
         settings: what the body is drawn from.
         switch: the task that needs feedback.

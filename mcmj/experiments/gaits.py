@@ -12,10 +12,11 @@ from mcmj.experiments.gaits_config import Config, check, get_body
 from mcmj.experiments.gaits_result import BodyResult, Result, Run, Taught, measure, outcome
 from mcmj.gaits import LEGS, gait_target
 from mcmj.mjcf import checked_readout
+from mcmj.phases import Phase, Schedule
 from mcmj.practice import practise
 from mcmj.progress import OnSteps
 from mcmj.readout import Fit
-from mcmj.schedule import Phase, Schedule, run_schedule
+from mcmj.schedule import run_schedule
 from mcmj.simulation import Simulation
 from mcmj.targets import Target
 from mcmj.teaching import Course, lessons_of, synchronise

@@ -9,9 +9,9 @@ from mcmj.bodyfile import body_of_model, load_model, provenance_of_model, readou
 from mcmj.errors import InvalidArgumentError, UnknownNameError
 from mcmj.gaits import GAITS, LEGS, gait_target
 from mcmj.generator import BodySettings, draw_body
+from mcmj.lessons import Teaching
 from mcmj.library import body_path
 from mcmj.practice import Practice
-from mcmj.teaching import Teaching
 from mcmj.validation import Array, require_count, require_number
 
 # the default body with all its motion 1.5 times faster, for a walk's swing is fast: stiffness and

@@ -15,10 +15,10 @@ from mcmj.bodyfile import (
 from mcmj.driven import QUADRATIC
 from mcmj.errors import InvalidArgumentError, McmjWarning, UnknownNameError
 from mcmj.generator import BodySettings, draw_body
+from mcmj.lessons import Teaching
 from mcmj.library import body_path
 from mcmj.practice import Practice
 from mcmj.profiles import Profile, Ramp, hold
-from mcmj.teaching import Teaching
 from mcmj.validation import Array, require_count, require_number
 
 SYSTEM = QUADRATIC

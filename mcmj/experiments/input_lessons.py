@@ -7,11 +7,12 @@ import numpy as np
 
 from mcmj import metrics
 from mcmj.experiments.input_driven_config import SYSTEM, Config
+from mcmj.lessons import Lesson
 from mcmj.practice import Exercise, Practised, practise_exercises
 from mcmj.profiles import Profile, hold
 from mcmj.progress import OnSteps
 from mcmj.simulation import Simulation
-from mcmj.teaching import Course, Lesson
+from mcmj.teaching import Course
 from mcmj.validation import Array
 
 

@@ -18,11 +18,11 @@ from mcmj.bodyfile import (
 from mcmj.errors import InvalidArgumentError, McmjWarning, UnknownNameError
 from mcmj.freerun import WINDOW
 from mcmj.generator import BodySettings, draw_body
+from mcmj.lessons import Teaching
 from mcmj.library import body_path
 from mcmj.options import DEFAULT_INTEGRATOR, ENGINES
 from mcmj.spring_laws import NATIVE
 from mcmj.targets import TARGETS, Target
-from mcmj.teaching import Teaching
 from mcmj.validation import Array, require_number
 
 
@@ -39,7 +39,7 @@ class Config:
         free_run: length of the free run in closed loop [s].
         window: the errors are those of this last part of it [s].
         timestep: control and physics step [s].
-        integrator: one of MuJoCo's.
+        integrator: Euler, RK4, implicit, implicitfast, discrete or leapfrog.
         engine: mujoco, or twin: faster, the same to rounding, no video.
         windows: length of the consecutive windows of the free run whose errors are given too
             [s]; 0: none.

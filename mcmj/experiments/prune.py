@@ -10,10 +10,11 @@ from mcmj.errors import InvalidArgumentError, UnknownNameError
 from mcmj.experiments import limit_cycle
 from mcmj.generator import BodySettings
 from mcmj.heldout import closed_loop_errors, held_out_starts
+from mcmj.lessons import Teaching
 from mcmj.pruning import METHODS, importance, sense_only
 from mcmj.simulation import Simulation
 from mcmj.targets import TARGETS, target
-from mcmj.teaching import Course, Teaching, lessons_of
+from mcmj.teaching import Course, lessons_of
 from mcmj.validation import Array, require_count, require_number
 
 OnRuns = Callable[[int], object]

@@ -9,14 +9,17 @@ from mcmj.body import Body
 from mcmj.bodyfile import body_of_model, load_model, readout_of_model, readouts_of_model
 from mcmj.errors import InvalidArgumentError, TrajectoryFileError, UnknownNameError
 from mcmj.film import Film, Window
+from mcmj.gaits import NAMES, named_target
+from mcmj.lessons import Teaching
 from mcmj.library import body_path
+from mcmj.phases import Phase, Schedule
 from mcmj.progress import OnSteps
 from mcmj.rendering import ORBIT_POINTS, Style
-from mcmj.schedule import Phase, Schedule, ScheduleRun, run_schedule
+from mcmj.schedule import ScheduleRun, run_schedule
 from mcmj.simulation import Simulation
 from mcmj.streams import stream
-from mcmj.targets import TARGETS, Target, target
-from mcmj.teaching import Teaching, synchronise, teach
+from mcmj.targets import Target
+from mcmj.teaching import synchronise, teach
 from mcmj.trajectory import Trajectory, join
 from mcmj.trajectory_file import load_trajectory
 from mcmj.validation import Array, require_count, require_number
@@ -82,8 +85,8 @@ class Config:
         for kind in self.formats:
             if kind not in FORMATS:
                 raise UnknownNameError("format", kind, FORMATS)
-        if self.task is not None and self.task not in TARGETS:
-            raise UnknownNameError("task", self.task, TARGETS)
+        if self.task is not None and self.task not in NAMES:
+            raise UnknownNameError("task", self.task, NAMES)
 
     @property
     def disturbance(self) -> str:
@@ -128,7 +131,7 @@ def _film_of_file(config: Config, path: Path) -> Film:
     outputs = trajectory.outputs
     if outputs is None:
         outputs = np.zeros((len(trajectory), body.n_outputs))
-    wanted = None if config.task is None else target(config.task)
+    wanted = None if config.task is None else named_target(config.task)
     return _film(config, body, trajectory, outputs, np.zeros(body.n_nodes), wanted, ())
 
 
@@ -142,10 +145,10 @@ def _find(config: Config) -> tuple[Body, Array | None, Target | None]:
     w_out = named[name] if named and name in named else None
     if w_out is None and not named:
         w_out = readout_of_model(model)
-    task = config.task or (name if name in TARGETS else None)
+    task = config.task or (name if name in NAMES else None)
     if task is None and w_out is None:
         task = "van_der_pol"
-    wanted = None if task is None else target(task)
+    wanted = None if task is None else named_target(task)
     if wanted is not None and body.n_outputs != wanted.n_outputs:
         raise InvalidArgumentError("body", f"{wanted.n_outputs} outputs for {task}", body)
     return body, w_out, wanted

@@ -7,10 +7,10 @@ import numpy as np
 from mcmj.errors import DivergenceError
 from mcmj.experiments import limit_cycle
 from mcmj.generator import BodySettings
+from mcmj.lessons import Teaching
 from mcmj.progress import OnSteps
 from mcmj.rates import success_rate
 from mcmj.targets import TARGETS
-from mcmj.teaching import Teaching
 from mcmj.validation import Array, require_count, require_number
 
 

@@ -9,13 +9,14 @@ from mcmj.body import Body
 from mcmj.errors import DivergenceError, InvalidArgumentError
 from mcmj.experiments import limit_cycle
 from mcmj.generator import BodySettings
+from mcmj.lessons import Teaching
 from mcmj.practice import Practice, practise
 from mcmj.progress import OnSteps
 from mcmj.rates import success_rate
 from mcmj.simulation import Simulation
 from mcmj.streams import stream
 from mcmj.targets import Target, target
-from mcmj.teaching import Course, Teaching, lessons_of
+from mcmj.teaching import Course, lessons_of
 from mcmj.threads import in_threads
 from mcmj.validation import Array, require_count, require_number
 

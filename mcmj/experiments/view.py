@@ -10,12 +10,13 @@ from mcmj.body import Body
 from mcmj.bodyfile import body_of_model, load_model, readout_of_model, readouts_of_model
 from mcmj.errors import InvalidArgumentError
 from mcmj.film import deformation_scale
+from mcmj.lessons import Teaching
 from mcmj.library import body_path
 from mcmj.live import LiveLoop
 from mcmj.simulation import Simulation
 from mcmj.streams import stream
 from mcmj.targets import TARGETS, target
-from mcmj.teaching import Teaching, synchronise, teach
+from mcmj.teaching import synchronise, teach
 from mcmj.trajectory import State
 from mcmj.validation import Array, require_number
 from mcmj.viewer import FPS, Viewer

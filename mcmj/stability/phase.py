@@ -2,7 +2,7 @@
 
 White noise of standard deviation s on every length, new at each step, is fed back as W_out^T
 times it: Gaussian with covariance s^2 W_out^T W_out. Along the cycle nothing brings the phase
-back, so its variance grows as 2 D t.
+back: to first order in s every period adds a shift of variance 2 D T, independent of the others.
 """
 
 from dataclasses import dataclass
@@ -16,6 +16,8 @@ from mcmj.stability.loop import ClosedLoop
 from mcmj.streams import stream
 from mcmj.validation import Array, require_count, require_number
 
+BATCH = 32  # copies at a time: 16 MB of noise at 6 s
+
 
 @dataclass(frozen=True)
 class Diffusion:
@@ -23,17 +25,28 @@ class Diffusion:
 
     Attributes:
         noise: standard deviation on every length [m].
-        coefficient: D [s^2/s], half the slope of the variance, by least squares.
-        jitter: standard deviation gained in a period, over the period: sqrt(2 D / T).
-        times: (K,) [s].
-        variance: (K,) of the phases over the copies [s^2].
+        period: T [s].
+        shifts: (B,) phases that the copies gained from a period of noise, but for a constant [s].
     """
 
     noise: float
-    coefficient: float
-    jitter: float
-    times: Array
-    variance: Array
+    period: float
+    shifts: Array
+
+    @property
+    def coefficient(self) -> float:
+        """D = var(shifts) / 2 T [s^2/s]."""
+        return float(self.shifts.var(ddof=1)) / (2 * self.period)
+
+    @property
+    def jitter(self) -> float:
+        """Standard deviation gained in a period, over the period: sqrt(2 D / T)."""
+        return float(self.shifts.std(ddof=1)) / self.period
+
+    @property
+    def jitter_error(self) -> float:
+        """Standard error of the jitter: of a Gaussian's deviation, jitter / sqrt(2 (B - 1))."""
+        return self.jitter / float(np.sqrt(2 * (len(self.shifts) - 1)))
 
 
 def fed_back_noise(
@@ -54,44 +67,36 @@ def phase_diffusion(
     cycle: Cycle,
     noise: float,
     *,
-    copies: int = 32,
-    periods: int = 12,
+    copies: int = 128,
+    rest: int = 3,
     seed: int = 0,
 ) -> Diffusion:
     """Wander of the phase under sensor noise of a standard deviation [m].
 
-    The phase of a state is that of its foot on the cycle, all coordinates counted in units of
-    cycle.scale; it is read once a period.
+    Copies run for a period with noise, each with its own, then for `rest` periods without. What
+    the noise did across the cycle has then died away (by the leading multiplier to the power of
+    `rest`); what is left is the shift along it, read as that of the foot on the cycle, all
+    coordinates counted in units of cycle.scale.
 
     Raises:
         InvalidArgumentError: an argument out of bounds, or noise that throws a copy off.
     """
     require_number("noise", noise, 0.0, open_low=True)
     require_count("copies", copies, 2)
-    require_count("periods", periods, 3)
-    steps = round(cycle.period / loop.timestep)
-    phase_of = _Phases(loop, cycle)
-    generator = stream(seed, "length_noise")
-    states = np.tile(cycle.state, (copies, 1))
-    phases = np.empty((periods, copies))
-    total = 0.0
-    for k in range(periods):
-        run = loop.run(
-            states, offset=fed_back_noise(loop, generator, np.full(copies, noise), steps)
-        )
+    require_count("rest", rest, 0)
+    noisy = round(cycle.period / loop.timestep)
+    quiet = round((1 + rest) * cycle.period / loop.timestep) - noisy
+    phase_of, generator = _Phases(loop, cycle), stream(seed, "length_noise")
+    shifts = []
+    for first in range(0, copies, BATCH):
+        deviations = np.full(min(BATCH, copies - first), noise)
+        offset = fed_back_noise(loop, generator, deviations, noisy)
+        run = loop.run(np.tile(cycle.state, (len(deviations), 1)), offset=offset)
         if not run.alive.all():
             raise InvalidArgumentError("noise", "an amplitude that the cycle survives", noise)
-        states = run.states
-        total += steps * loop.timestep
-        before = phases[k - 1] if k else np.zeros(copies)
-        gained = phase_of(states) - total - before
-        phases[k] = before + (gained + cycle.period / 2) % cycle.period - cycle.period / 2
-    times = cycle.period * np.arange(1, periods + 1, dtype=np.float64)
-    variance: Array = phases.var(axis=1, ddof=1, dtype=np.float64)
-    slope = float(np.polyfit(times, variance, 1)[0])
-    coefficient = max(slope, 0.0) / 2
-    jitter = float(np.sqrt(2 * coefficient / cycle.period))
-    return Diffusion(noise, coefficient, jitter, times, variance)
+        gained = phase_of(loop.advance(run.states, quiet))
+        shifts.append((gained + cycle.period / 2) % cycle.period - cycle.period / 2)
+    return Diffusion(noise, cycle.period, np.concatenate(shifts))
 
 
 class _Phases:

@@ -1,0 +1,104 @@
+"""What bodies are set to do in an environment, by name; no dm_control here.
+
+A task is a limit cycle of `mcmj.targets`, a gait of `mcmj.gaits`, or the rhythm that an input
+chooses (`mcmj.driven`): "eps=1" is the quadratic system's cycle at that eps, with the input
+held there.
+"""
+
+import functools
+from dataclasses import dataclass
+
+import numpy as np
+
+from mcmj.body import Body
+from mcmj.bodyfile import (
+    body_of_model,
+    load_model,
+    provenance_of_model,
+    readout_of_model,
+    readouts_of_model,
+)
+from mcmj.driven import QUADRATIC
+from mcmj.errors import InvalidArgumentError, UnknownNameError
+from mcmj.gaits import GAITS, LEGS, NAMES, named_target
+from mcmj.lessons import Teaching
+from mcmj.library import body_names, body_path
+from mcmj.options import Options
+from mcmj.simulation import Simulation
+from mcmj.targets import TARGETS, Target
+from mcmj.teaching import synchronise, teach
+from mcmj.trajectory import State
+from mcmj.validation import Array
+
+DRIVEN = {f"eps={value:g}": value for value in (5.0, 1.0, 0.2)}  # those of Figs. 10 and 11
+TEACHABLE = {2: tuple(TARGETS), len(LEGS): tuple(GAITS)}  # by the number of outputs
+
+
+@dataclass(frozen=True)
+class Assignment:
+    """A body with its readout, and what it is to do.
+
+    Attributes:
+        w_out: (L or L + 1, n_outputs).
+        target: the orbit.
+        inputs: (n_inputs,) held all the time.
+    """
+
+    body: Body
+    w_out: Array
+    target: Target
+    inputs: Array
+
+
+def assign(name: str, task: str | None = None) -> Assignment:
+    """A body by its name, or of a body file, and its task.
+
+    Args:
+        name: a body that comes with mcmj, or a path.
+        task: default: the first that the file holds a readout for. Without one for it in the
+            file the body is taught it first.
+
+    Raises:
+        UnknownNameError: no such body, or no such task for it.
+        InvalidArgumentError: there is no task for so many outputs.
+    """
+    body, readouts = _read(name)
+    if body.n_outputs not in TEACHABLE:
+        raise InvalidArgumentError("body", "2 outputs, or 4 for gaits", body.n_outputs)
+    choices = [*readouts, *TEACHABLE[body.n_outputs]]
+    task = task or choices[0]
+    if task not in choices:
+        raise UnknownNameError(f"task of {body!r}", task, set(choices))
+    w_out = readouts[task] if task in readouts else _taught(name, task)
+    return Assignment(body, w_out, _target(task), np.full(body.n_inputs, DRIVEN.get(task, 0.0)))
+
+
+def all_tasks() -> list[tuple[str, str]]:
+    """Names of bodies that come with mcmj, and of tasks that their files hold readouts for."""
+    return [(name, task) for name in body_names() for task in _read(name)[1]]
+
+
+def state_on_cycle(body: Body, wanted: Target, inputs: Array, options: Options) -> State:
+    """Where clean teacher forcing from rest brings a body, inputs (n_inputs,) held."""
+    simulation = Simulation(body, timestep=options.timestep, integrator=options.integrator)
+    synchronise(simulation, wanted, Teaching().washout, inputs)
+    return simulation.state
+
+
+def _read(name: str) -> tuple[Body, dict[str, Array]]:
+    """A body, and the readouts (L or L + 1, n_outputs) in its file by task."""
+    model = load_model(body_path(name))
+    active, named = readout_of_model(model), readouts_of_model(model)
+    readouts = {task: w_out for task, w_out in named.items() if task in NAMES}
+    if active is not None and "taught_inputs" in (provenance_of_model(model) or {}):
+        readouts = dict.fromkeys(DRIVEN, active) | readouts
+    return body_of_model(model), readouts
+
+
+def _target(task: str) -> Target:
+    return QUADRATIC.cycle(DRIVEN[task]) if task in DRIVEN else named_target(task)
+
+
+@functools.cache
+def _taught(name: str, task: str) -> Array:
+    return teach(Simulation(_read(name)[0]), _target(task), Teaching(), seed=0).w_out
