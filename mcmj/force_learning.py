@@ -8,7 +8,7 @@ own errors lead to are learned from too (Sussillo and Abbott, Neuron 63, 2009). 
 is a linear, static readout, as a regression's.
 """
 
-from collections.abc import Callable
+from collections.abc import Iterator
 from dataclasses import dataclass, fields
 
 import numpy as np
@@ -36,6 +36,8 @@ class ForceLearning:
         ridge: penalty of the squared weights, in squared lengths [m^2].
         warm_up: first, the teacher drives the muscles, the loop open [s] ..
         washout: .. and nothing is learned at the beginning of that [s].
+        noise: on the muscles' commands, over their RMS change of length ..
+        noise_hold: .. each held for this time [s].
         rounds: of learning in closed loop, at most.
         round_duration: of each [s].
         trial: after each, a free run [s] whose last half is judged; the best round counts.
@@ -49,7 +51,9 @@ class ForceLearning:
     ridge: float = 5e-9
     warm_up: float = 6.0
     washout: float = 3.0
-    rounds: int = 6
+    noise: float = 0.1
+    noise_hold: float = 0.05
+    rounds: int = 4
     round_duration: float = 20.0
     trial: float = 20.0
     good_enough: float = 0.05
@@ -58,7 +62,8 @@ class ForceLearning:
         require_count("rounds", self.rounds, 1)
         for field in fields(self):
             if field.name != "rounds":
-                require_number(field.name, getattr(self, field.name), 0.0, open_low=True)
+                low_open = field.name != "noise"
+                require_number(field.name, getattr(self, field.name), 0.0, open_low=low_open)
 
 
 @dataclass(frozen=True)
@@ -81,61 +86,96 @@ def force_learn(
     target: Target,
     learning: ForceLearning,
     *,
+    seed: int,
     on_steps: OnSteps = lambda steps: None,
 ) -> Learned:
     """Teach a standing robot a gait; it is left in it, in closed loop, with the best readout.
 
     Args:
         target: of the muscles, see mcmj.trunk.muscle_target.
+        seed: of the noise.
         on_steps: called with the number of steps done, for progress bars.
+
+    Raises:
+        DivergenceError: the robot blew up in its first round.
     """
-    every = max(1, round(learning.period / walker.timestep))
-    step = every * walker.timestep
-    squares = RecursiveLeastSquares(
-        walker.trunk.n_sensed + 1, N_MUSCLES, ridge=learning.ridge
-    )
-
-    def attend(start: float, duration: float, lesson: Callable[[float], None]) -> float:
-        count = round(duration / step)
-        for k in range(count):
-            lesson(start + k * step)
-        on_steps(count * every)
-        return start + count * step
-
-    def forced(time: float) -> None:
-        wanted = target.sample([time])[0]
-        if time >= learning.washout:
-            squares.update(walker.features(), wanted)
-        walker.advance(every, min(1.0, time / RAMP) * wanted)
-
-    def own(time: float) -> None:
-        squares.update(walker.features(), target.sample([time])[0])
-        walker.set_readout(squares.weights)
-        walker.advance(every)
-
+    lessons = _Lessons(walker, target, learning, seed, on_steps)
     walker.stand()
-    now = attend(0.0, learning.warm_up, forced)
-    walker.close(True)
+    lessons.warm_up()
     best, errors = None, []
     for _ in range(learning.rounds):
         try:
-            now = attend(now, learning.round_duration, own)
+            lessons.round()
         except DivergenceError:
-            errors.append(np.inf)
+            if best is None:
+                raise
             break
-        found = Learned(squares.weights, (), walker.state)
+        w_out, state = walker.w_out, walker.state
         errors.append(trial_error(walker, target, learning.trial))
-        walker.restore(found.state)
-        if best is None or errors[-1] <= min(errors):
-            best = found
+        on_steps(round(learning.trial / walker.timestep))
+        walker.restore(state)
+        if errors[-1] <= min(errors):
+            best = w_out, state
         if errors[-1] <= learning.good_enough:
             break
-        on_steps(round(learning.trial / walker.timestep))
-    if best is None:
-        raise DivergenceError("the robot blew up as it learned", time=now, steps_done=0)
-    walker.set_readout(best.w_out)
-    walker.restore(best.state)
-    return Learned(best.w_out, tuple(errors), best.state)
+    assert best is not None
+    walker.set_readout(best[0])
+    walker.restore(best[1])
+    return Learned(best[0], tuple(errors), best[1])
+
+
+class _Lessons:
+    """What one robot has heard and learned of one target; the teacher's clock goes on."""
+
+    def __init__(
+        self,
+        walker: TrunkWalker,
+        target: Target,
+        learning: ForceLearning,
+        seed: int,
+        on_steps: OnSteps,
+    ) -> None:
+        self._walker, self._target, self._learning = walker, target, learning
+        self._rng, self._on_steps = stream(seed, "teacher_noise"), on_steps
+        n_features = walker.trunk.n_sensed + 1
+        self._squares = RecursiveLeastSquares(n_features, N_MUSCLES, ridge=learning.ridge)
+        self._every = max(1, round(learning.period / walker.timestep))
+        self._period = self._every * walker.timestep
+        self._done = 0
+
+    def warm_up(self) -> None:
+        """The teacher drives the muscles, the loop open."""
+        walker, learning = self._walker, self._learning
+        for time, noise in self._moments(learning.warm_up):
+            wanted = self._target.sample([time])[0]
+            if time >= learning.washout:
+                self._squares.update(walker.features(), wanted)
+            walker.advance(self._every, min(1.0, time / RAMP) * wanted + noise)
+
+    def round(self) -> None:
+        """The robot drives itself, and is corrected."""
+        walker = self._walker
+        walker.close(True)
+        for time, noise in self._moments(self._learning.round_duration):
+            self._squares.update(walker.features(), self._target.sample([time])[0])
+            walker.set_readout(self._squares.weights)
+            walker.advance(self._every, noise)
+
+    def _moments(self, duration: float) -> Iterator[tuple[float, Array]]:
+        """Times [s] and noise (N_MUSCLES,) [m] of the next corrections."""
+        count = round(duration / self._period)
+        hold = max(1, round(self._learning.noise_hold / self._period))
+        size = self._learning.noise * rms_command(self._target)
+        noise = size * self._rng.standard_normal((-(-count // hold), N_MUSCLES))
+        for k in range(count):
+            yield self._done * self._period, noise[k // hold]
+            self._done += 1
+        self._on_steps(count * self._every)
+
+
+def rms_command(target: Target) -> float:
+    """Root mean square change of a muscle's length about its mean [m]."""
+    return metrics.rms_radius(target.orbit(metrics.ORBIT_POINTS)) / np.sqrt(N_MUSCLES)
 
 
 def learn_by_regression(
@@ -153,18 +193,19 @@ def learn_by_regression(
     Args:
         learning: its period, warm-up and washout are used.
         duration: of the teacher's driving after the warm-up [s].
-        noise: on the commands, held over the period, over the target's RMS radius.
+        noise: on the commands, held over the period, over the RMS change of length.
         ridge_per_row: [m^2].
         seed: of the noise.
     """
     every = max(1, round(learning.period / walker.timestep))
     step = every * walker.timestep
-    radius = metrics.rms_radius(target.orbit(metrics.ORBIT_POINTS)) / np.sqrt(N_MUSCLES)
     count = round((learning.warm_up + duration) / step)
     times = step * np.arange(count)
     wanted = target.sample(times)
     disturbed = np.minimum(1.0, times / RAMP)[:, None] * wanted
-    disturbed += noise * radius * stream(seed, "teacher_noise").standard_normal(wanted.shape)
+    disturbed += (
+        noise * rms_command(target) * stream(seed, "teacher_noise").standard_normal(wanted.shape)
+    )
     rows = np.empty((count, walker.trunk.n_sensed))
     walker.stand()
     for k in range(count):

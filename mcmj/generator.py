@@ -150,6 +150,7 @@ def delaunay_springs(positions: npt.ArrayLike) -> npt.NDArray[np.int64]:
 
 
 def log_uniform(rng: np.random.Generator, bounds: Range, size: int) -> Array:
+    """Numbers (size,) whose logarithms are uniform between those of the bounds."""
     low, high = bounds
     if low == high:
         return np.full(size, float(low))

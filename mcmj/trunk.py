@@ -124,7 +124,7 @@ def draw_trunk(seed: int, settings: TrunkSettings | None = None) -> Trunk:
     inner = stream(seed, "topology").uniform(
         (0.0, 0.1 * settings.height), (w, settings.height), (n - len(hips), 2)
     )
-    trunk = np.vstack([hips, inner]) + [0.0, settings.leg]
+    trunk = np.vstack([hips, inner]) + np.array([0.0, settings.leg])
     springs = delaunay_springs(trunk)
     feet = [[(trunk[list(_HIPS[leg]), 0].mean() + _side(leg) * _APART), 0.0] for leg in LEGS]
     muscles = [[hip, n + i] for i, leg in enumerate(LEGS) for hip in _HIPS[leg]]

@@ -26,6 +26,7 @@ BODY = 230  # height of the body's picture
 FPS = 25
 SHOWN = 3.0  # seconds of the gait diagram, the last at its right edge
 LARGEST = 0.08  # largest displacement of a node as drawn, over the size of the picture
+FULL_STRAIN = 0.005  # at which a spring has its full colour
 INK, BAR, MARK = (30, 30, 30), (40, 60, 110), (224, 123, 0)
 STRETCHED, SHORTENED, SLACK = (0.84, 0.15, 0.16), (0.12, 0.31, 0.84), (0.55, 0.58, 0.62)
 
@@ -124,7 +125,9 @@ def _pictures(
     for qpos in joints:
         data.qpos[:] = qpos
         mujoco.mj_forward(model, data)
-        model.tendon_rgba[springs, :3] = _strain_colours(data.ten_length[springs] / rest - 1)
+        model.tendon_rgba[springs, :3] = strain_colours(
+            data.ten_length[springs] / rest - 1, FULL_STRAIN
+        )
         robot.update_scene(data, camera)
         picture = robot.render().copy()
         data.qpos[:nodes] *= magnified
@@ -133,9 +136,9 @@ def _pictures(
         yield picture, body.render().copy()
 
 
-def _strain_colours(strain: Array) -> Array:
-    """Blue when shortened, red when stretched, full at a strain of 0.5 %."""
-    weight = np.minimum(np.abs(strain) / 0.005, 1.0)[:, None]
+def strain_colours(strain: Array, full: float) -> Array:
+    """Colours (n, 3): blue when shortened, red when stretched, full at the strain `full`."""
+    weight = np.minimum(np.abs(strain) / full, 1.0)[:, None]
     goal = np.where(strain[:, None] > 0, STRETCHED, SHORTENED)
     return (1 - weight) * np.array(SLACK) + weight * goal
 

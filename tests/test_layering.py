@@ -64,6 +64,10 @@ CHAINS = (
     (("theory", "capacity", "filter_tasks"), ("probing",)),
     (("targets", "profiles"), ("driven",)),
     (("teaching", "driven"), ("experiments.input_lessons",)),
+    (("generator", "gaits"), ("trunk",)),
+    (("trunk",), ("trunk_walker",)),
+    (("trunk_walker", "rls"), ("force_learning",)),
+    (("force_learning",), ("experiments.trunk",)),
     (("environment_setting", "environment_task"), ("environment",)),
 )
 MUJOCO = {
@@ -82,6 +86,8 @@ MUJOCO = {
     "simulation",
     "structs",
     "viewer",
+    "trunk_walker",
+    "trunkvideo",
     "walker",
     "walkvideo",
 }
