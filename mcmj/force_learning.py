@@ -191,9 +191,9 @@ def learn_by_regression(
     """Teach a standing robot by plain ridge regression; it is left in closed loop with the readout.
 
     Args:
-        learning: its period, warm-up and washout are used.
+        learning: its period, warm-up, washout and noise_hold are used.
         duration: of the teacher's driving after the warm-up [s].
-        noise: on the commands, held over the period, over the RMS change of length.
+        noise: on the commands, held as in learning, over their RMS change of length.
         ridge_per_row: [m^2].
         seed: of the noise.
     """

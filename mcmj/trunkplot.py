@@ -15,7 +15,7 @@ from mcmj.walkmetrics import Walk
 
 PERIODS = 3.0  # of each gait that are shown
 BAR = 0.7
-MUSCLE = "#b03030"
+MUSCLE = "#7d3b9e"
 
 
 def trunk_figure(trunk: Trunk, walks: Mapping[str, tuple[Target, Walk]]) -> Figure:

@@ -21,7 +21,7 @@ Frame = npt.NDArray[np.uint8]
 
 WIDTH, HEIGHT = 640, 480  # pixels of the robot's picture; the diagram is beside it
 FULL_STRAIN = 0.05
-MUSCLE = (0.69, 0.19, 0.19)
+MUSCLE = (0.49, 0.23, 0.62)
 
 
 def trunk_video(path: str | Path, walkers: Mapping[str, TrunkWalker], *, shown: float) -> None:
