@@ -27,7 +27,7 @@ def work(config: Config, output: Output, out: Path) -> None:
         [objective for _, objective in result.tried],
         result.judged,
         config.threshold,
-        names=(config.objective, config.score.rpartition(".")[2].replace("_", " ")),
+        names=(config.objective, config.target.name),
         maximise=(config.large_is_good, config.maximise),
     )
     save(figure, out / "guided.png")

@@ -235,7 +235,7 @@ def test_errors_end_with_a_message(tmp_path):
     for options, text in (
         (["--store", tmp_path / "text.sqlite"], "damaged, or not a store"),
         (["--scheduler", "tcp://127.0.0.1:9"], "the address of a Dask scheduler"),
-        (["--score", "quadratic.orbit"], "unknown number of the metrics 'quadratic.orbit'"),
+        (["--score", "quadratic.orbit_error"], "unknown number of the metrics 'quadratic.orbit_error'"),
     ):
         done = run("search", "--set", *SET, "--seeds", "2", "--out", tmp_path, "--quiet", *options)
         assert done.returncode == 1

@@ -9,7 +9,7 @@ import numpy as np
 from mcmj.errors import InvalidArgumentError, UnknownNameError
 from mcmj.rates import success_rate
 from mcmj.search.database import TrialStore
-from mcmj.search.experiment import Score, Trial, make_config
+from mcmj.search.experiment import Score, Trial, default_score, make_config
 from mcmj.search.overrides import override, parse_assignment, value_at
 from mcmj.search.runner import run_trials
 from mcmj.search.space import Space, parse_dimension
@@ -71,7 +71,7 @@ class Config:
     first_seed: int = 0
     judged: int = 50
     judged_from: int = 1000
-    score: str = "*.orbit_error"
+    score: str | None = None
     threshold: float = 0.05
     maximise: bool = False
     objective: str = "log"
@@ -111,7 +111,8 @@ class Config:
     @property
     def target(self) -> Score:
         """What a trial is after."""
-        return Score(self.score, self.threshold, self.maximise)
+        path = self.score or default_score(self.experiment)
+        return Score(path, self.threshold, self.maximise)
 
     @property
     def large_is_good(self) -> bool:
@@ -189,7 +190,7 @@ def run(
             finished is kept; the same call goes on from there.
     """
     hand = config.hand_chosen
-    account = plain([config.experiment, hand, sorted(config.vary), config.score, config.objective,
+    account = plain([config.experiment, hand, sorted(config.vary), config.target.path, config.objective,
                      config.bodies, config.first_seed, config.draw_seed, config.startup,
                      config.maximise])  # fmt: skip
     study = Study(
