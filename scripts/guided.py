@@ -49,6 +49,11 @@ def show(result: Result, out: Path) -> None:
     console.print(table)
     console.print(f"guided: {result.best}")
     console.print(f"hand-chosen: {metrics['hand_chosen']}")
+    if result.confirmed.size:
+        console.print(
+            f"guided, in MuJoCo: {metrics['confirmed']} bodies, the same verdict in "
+            f"{100 * metrics['twin_mujoco_agreement']:.1f} %"
+        )
     console.print(f"results in {out}")
 
 

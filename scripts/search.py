@@ -95,7 +95,8 @@ def show(result: Result, out: Path) -> None:
         table.add_row(name, value, *rate_cells(row))
     console.print(table)
     best = [title(result, int(index)) for index in result.ranking[: config.best]]
-    console.print("best: " + "; ".join(best))
+    if best:
+        console.print("best: " + "; ".join(best))
     speed = metrics["trials_per_second"]
     console.print(
         f"{metrics['trials']} trials, {metrics['evaluated']} of them run now"

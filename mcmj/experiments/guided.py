@@ -51,6 +51,7 @@ class Config:
         first_seed: of these bodies.
         judged: number of other bodies on which the best setting meets the hand-chosen one.
         judged_from: their first seed.
+        confirm: so many of them are run again in MuJoCo with the best setting; default: all.
         score, threshold, maximise: of a trial, as for a search.
         objective: of a setting, over its bodies: log (mean of log10 of the scores, at most 1
             each), success_rate or median.
@@ -71,6 +72,7 @@ class Config:
     first_seed: int = 0
     judged: int = 50
     judged_from: int = 1000
+    confirm: int | None = None
     score: str | None = None
     threshold: float = 0.05
     maximise: bool = False
@@ -87,6 +89,8 @@ class Config:
             require_count(name, getattr(self, name), 1)
         for name in ("startup", "first_seed", "judged_from", "draw_seed"):
             require_count(name, getattr(self, name), 0)
+        if self.confirm is not None:
+            require_count("confirm", self.confirm, 0)
         require_number("threshold", self.threshold, -np.inf)
         if self.objective not in OBJECTIVES:
             raise UnknownNameError("objective", self.objective, OBJECTIVES)
@@ -132,14 +136,15 @@ class Result:
         tried: settings and objectives in order.
         best: the best setting.
         judged: scores (bodies,) on other bodies, of "hand-chosen" and "guided".
-        confirmed: the latter's in MuJoCo; None without a choice of engine.
+        confirmed: the latter's of the first of these bodies in MuJoCo; empty without a choice
+            of engine.
     """
 
     config: Config
     tried: list[tuple[dict[str, object], float]]
     best: dict[str, object]
     judged: dict[str, Array]
-    confirmed: Array | None
+    confirmed: Array
 
     @property
     def metrics(self) -> dict[str, object]:
@@ -159,9 +164,9 @@ class Result:
                 "objective": judge(scores, score),
                 "scores": scores,
             }
-        if self.confirmed is not None:
-            guided = self.judged["guided"]
-            pairs = zip(self.confirmed, guided, strict=True)
+        if self.confirmed.size:
+            pairs = zip(self.confirmed, self.judged["guided"], strict=False)
+            table["confirmed"] = self.confirmed.size
             table["twin_mujoco_agreement"] = float(
                 np.mean([score.succeeds(a) == score.succeeds(b) for a, b in pairs])
             )
@@ -190,9 +195,9 @@ def run(
             finished is kept; the same call goes on from there.
     """
     hand = config.hand_chosen
-    account = plain([config.experiment, hand, sorted(config.vary), config.target.path, config.objective,
-                     config.bodies, config.first_seed, config.draw_seed, config.startup,
-                     config.maximise])  # fmt: skip
+    account = plain([config.experiment, hand, sorted(config.vary), config.target.path,
+                     config.objective, config.bodies, config.first_seed, config.draw_seed,
+                     config.startup, config.maximise])  # fmt: skip
     study = Study(
         config.study or folder / "study.sqlite", account, config.space, config.draw_seed,
         startup=config.startup, maximise=config.large_is_good,
@@ -219,9 +224,8 @@ def run(
             "guided": _scores(config, best, others, store, workers),
         }
         choice = getattr(hand, "engine", "mujoco") != "mujoco"
-        confirmed = (
-            _scores(config, best | {"engine": "mujoco"}, others, store, workers) if choice else None
-        )
+        in_mujoco, some = best | {"engine": "mujoco"}, others[: config.confirm]
+        confirmed = _scores(config, in_mujoco, some, store, workers) if choice else np.zeros(0)
     return Result(config, study.told, best, judged, confirmed)
 
 

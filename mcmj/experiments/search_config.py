@@ -61,9 +61,9 @@ class Config:
     store: Path | None = None
 
     def __post_init__(self) -> None:
-        for name in ("seeds", "draws", "best"):
+        for name in ("seeds", "draws"):
             require_count(name, getattr(self, name), 1)
-        for name in ("first_seed", "draw_seed", "confirm", "audit", "cost_trials"):
+        for name in ("first_seed", "draw_seed", "confirm", "audit", "best", "cost_trials"):
             require_count(name, getattr(self, name), 0)
         require_number("threshold", self.threshold, -np.inf)
         if self.workers is not None:
