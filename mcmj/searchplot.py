@@ -10,6 +10,7 @@ import numpy.typing as npt
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
+from matplotlib.ticker import LogLocator, NullFormatter
 
 from mcmj.body import Body
 from mcmj.plotting import TARGET_COLOUR, TASK_COLOURS, TITLES, draw_body, new_figure
@@ -96,7 +97,7 @@ def draw_scores(
         axes.step(finite, share, where="post", color=colour, lw=1.4, label=text)
     finite = np.concatenate([scores[np.isfinite(scores)] for scores in groups.values()])
     if finite.size and finite.min() > 0 and finite.max() > _LOG_FROM * finite.min():
-        axes.set_xscale("log")
+        _use_log_axis(axes, finite.max() / finite.min())
     side = "above" if maximise else "below"
     axes.axvline(
         threshold, color=TARGET_COLOUR, ls="--", lw=1, label=f"success {side} {threshold:g}"
@@ -104,6 +105,14 @@ def draw_scores(
     axes.set(xlabel=name, ylabel="share of the bodies with less", ylim=(0, 1.02))
     axes.legend(loc="lower right", framealpha=0.9, edgecolor="none")
     axes.grid(alpha=0.3)
+
+
+def _use_log_axis(axes: Axes, ratio: float) -> None:
+    """As many numbers at a logarithmic axis from x to ratio x as there is room for."""
+    axes.set_xscale("log")
+    axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if ratio < 100.0 else (1.0,)))
+    axes.xaxis.set_major_formatter("{x:g}")
+    axes.xaxis.set_minor_formatter(NullFormatter())
 
 
 def best_bodies_figure(bodies: Sequence[tuple[Body, str]]) -> Figure:

@@ -32,9 +32,9 @@ def work(config: Config, output: Output, out: Path) -> None:
 def write(result: Result, out: Path) -> None:
     """metrics.json, body.xml with all readouts, trajectory.npz and the figures."""
     config, first = result.config, result.first
-    readouts = {name: g.w_out for name, g in first.gaits.items() if g.w_out is not None}
+    readouts = result.readouts
     xml = to_mjcf(
-        first.body,
+        result.body,
         timestep=config.timestep,
         w_out=next(iter(readouts.values()), None),
         readouts=readouts,

@@ -27,7 +27,7 @@ def work(config: Config, output: Output, out: Path) -> None:
         [objective for _, objective in result.tried],
         result.judged,
         config.threshold,
-        names=(config.objective, config.score.rpartition(".")[2].replace("_", " ")),
+        names=(config.objective, config.target.name),
         maximise=(config.large_is_good, config.maximise),
     )
     save(figure, out / "guided.png")
@@ -49,6 +49,11 @@ def show(result: Result, out: Path) -> None:
     console.print(table)
     console.print(f"guided: {result.best}")
     console.print(f"hand-chosen: {metrics['hand_chosen']}")
+    if result.confirmed.size:
+        console.print(
+            f"guided, in MuJoCo: {metrics['confirmed']} bodies, the same verdict in "
+            f"{100 * metrics['twin_mujoco_agreement']:.1f} %"
+        )
     console.print(f"results in {out}")
 
 

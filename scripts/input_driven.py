@@ -40,10 +40,10 @@ def body_file(result: Result) -> str:
     if first.practised is not None:
         lessons[config.readout_name] = store.plain(config)
     return to_mjcf(
-        start.body,
+        result.body,
         timestep=config.timestep,
         w_out=first.w_out,
-        readouts={**start.readouts, config.readout_name: first.w_out},
+        readouts=result.readouts,
         provenance={"body": start.source, "taught_inputs": start.taught, "lessons": lessons},
     )
 

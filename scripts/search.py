@@ -45,8 +45,9 @@ def write(result: Result, out: Path) -> None:
         store.write_text(out / (f"best_{place}.xml" if place > 1 else "best.xml"), xml)
     if result.by_setting:
         save(success_rate_figure(result.by_setting), out / "success_rate.png")
-    name = config.score.rpartition(".")[2].replace("_", " ")
-    figure = score_figure(groups(result), config.threshold, name=name, maximise=config.maximise)
+    figure = score_figure(
+        groups(result), config.threshold, name=config.target.name, maximise=config.maximise
+    )
     save(figure, out / "scores.png")
     if result.bodies:
         titles = [title(result, int(index)) for index in result.ranking]
@@ -60,7 +61,7 @@ def groups(result: Result) -> dict[str, np.ndarray]:
     if 1 < len(result.settings) <= 6:
         return {label(s): x for s, x in zip(result.settings, result.scores, strict=True)}
     if len(result.parts) > 1:
-        parts = {path.partition(".")[0]: x.ravel() for path, x in result.parts.items()}
+        parts = {result.config.target.label(path): x.ravel() for path, x in result.parts.items()}
         return {**parts, "the worst of them": result.scores.ravel()}
     return {"all trials": result.scores.ravel()}
 
@@ -83,17 +84,19 @@ def title(result: Result, index: int) -> str:
 def show(result: Result, out: Path) -> None:
     config, metrics, console = result.config, result.metrics, Console()
     side = "above" if config.maximise else "below"
-    table = Table(title=f"{config.experiment}: {config.score} {side} {config.threshold:g}")
+    table = Table(title=f"{config.experiment}: {config.target.path} {side} {config.threshold:g}")
     for column in ("", "", "trials", "95 % interval"):
         table.add_column(column)
-    rows = [("score", name, row) for name, row in result.success.items()]
+    parts = {path: config.target.label(path) for path in result.parts}
+    rows = [("score", parts.get(path, path), row) for path, row in result.success.items()]
     for path, values in result.by_setting.items():
         rows += [(path, bounds(row), row) for row in values]
     for name, value, row in rows:
         table.add_row(name, value, *rate_cells(row))
     console.print(table)
     best = [title(result, int(index)) for index in result.ranking[: config.best]]
-    console.print("best: " + "; ".join(best))
+    if best:
+        console.print("best: " + "; ".join(best))
     speed = metrics["trials_per_second"]
     console.print(
         f"{metrics['trials']} trials, {metrics['evaluated']} of them run now"

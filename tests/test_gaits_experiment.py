@@ -56,7 +56,7 @@ def test_runs_from_rest_start_from_rest(quick):
 
 def test_numbers_are_those_of_the_outputs(quick):
     table = quick.metrics
-    assert set(table) == {"trot", "bound", "switch"}
+    assert set(table) == {"trot", "bound", "switch", "worst_error"}
     assert set(table["switch"]) == {"trot_to_bound", "bound_to_trot"}
     run = quick.first.switches["trot", "bound"]
     last, goal = run.outputs[-10_000:], gait_target("bound")
@@ -70,6 +70,13 @@ def test_numbers_are_those_of_the_outputs(quick):
     lags = gaitmetrics.phase_lags(free.outputs[-10_000:], 1e-3, period)
     assert np.array_equal(table["trot"]["phase_lags"], lags)
     assert {"orbit_error", "phase_lag_error", "swing_up_time"} <= set(table["trot"]["from_rest"])
+    for kind, rows in {
+        "free_run": [table["trot"], table["bound"]],
+        "from_rest": [table["trot"]["from_rest"], table["bound"]["from_rest"]],
+        "switch": table["switch"].values(),
+    }.items():
+        worst = max(max(row["orbit_error"], row["period_error"]) for row in rows)
+        assert table["worst_error"][kind] == worst
 
 
 def test_rates_over_seeds():

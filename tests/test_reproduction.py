@@ -9,7 +9,7 @@ import pytest
 
 from mcmj.errors import McmjError, UnknownNameError
 from mcmj.plotting import new_figure, save
-from mcmj.reproduction.claims import Claim, Run, chosen, judge, numbers_at
+from mcmj.reproduction.claims import Claim, Run, chosen, judge
 from mcmj.reproduction.page import page
 from mcmj.reproduction.paper import PARTS
 from mcmj.reproduction.runner import execute, finished, metrics_of
@@ -32,13 +32,12 @@ document.title = [...document.images].every(image => image.naturalWidth > 100)
     ? "all pictures shown" : "a picture is missing" }</script>"""
 
 
-def test_numbers_are_looked_up_by_path():
-    assert numbers_at(METRICS, "a/x") == [0.01]
-    assert numbers_at(METRICS, "a/y") == [0.02, np.inf]
-    assert numbers_at(METRICS, "b/*/z") == [1.0, 0.04]
-    for path, text in (("a/w", "'w' is missing"), ("a", "no number"), ("a/x/y", "missing")):
-        with pytest.raises(McmjError, match=text):
-            numbers_at(METRICS, path)
+def test_all_numbers_of_a_claim_count_and_null_is_infinite():
+    outcome = judge(Claim("it works", "yes", "run", ("a/x", "a/y/*", "b/*/z")), METRICS)
+    assert outcome.values == (0.01, 0.02, np.inf, 1.0, 0.04)
+    assert outcome.rate["successes"] == 3
+    with pytest.raises(UnknownNameError, match="unknown number of the metrics 'a/w'"):
+        judge(Claim("it works", "yes", "run", ("a/x", "a/w")), METRICS)
 
 
 def test_a_claim_holds_unless_the_successes_refute_it():

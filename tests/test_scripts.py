@@ -164,7 +164,7 @@ def test_gaits(tmp_path):
     assert status == 0, err
     assert "from \\ to" in out
     metrics = metrics_of(tmp_path)["metrics"]
-    assert set(metrics) == {"trot", "pace", "switch"}
+    assert set(metrics) == {"trot", "pace", "switch", "worst_error"}
     assert {"orbit_error", "switching_time"} <= set(metrics["switch"]["trot_to_pace"])
     assert {"orbit_error", "phase_lag_error"} <= set(metrics["pace"])
     assert set(readouts_of_model(load_model(tmp_path / "body.xml"))) == {"trot", "pace"}

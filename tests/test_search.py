@@ -13,7 +13,7 @@ import mcmj
 from mcmj.bodyfile import load_model, provenance_of_model, readouts_of_model
 from mcmj.errors import InvalidArgumentError, McmjError, UnknownNameError
 from mcmj.experiments import guided, limit_cycle, search
-from mcmj.experiments.search_cost import overhead
+from mcmj.experiments.search_cost import affordable, overhead
 from mcmj.search.experiment import evaluate
 from mcmj.search.study import Study
 from mcmj.search.workers import Inline
@@ -126,11 +126,18 @@ def test_what_searching_costs_on_top(tmp_path):
     assert -0.5 < cost < 0.5
 
 
+def test_the_cost_is_measured_on_as_many_trials_as_run_six_times_within_a_minute():
+    assert affordable([1.0] * 24) == 10
+    assert affordable([4.0, 5.0, 2.0]) == 2
+    assert affordable([0.1] * 24) == 24
+    assert affordable([11.0, 0.1]) == affordable([]) == 0
+
+
 # --- guided ----------------------------------------------------------------------------------
 
 GUIDED = {
     "set": SET, "vary": ("teaching.noise=log(0.01,1)", "teaching.bias=[false,true]"),
-    "settings": 5, "startup": 2, "bodies": 2, "judged": 2, "workers": 1,
+    "settings": 5, "startup": 2, "bodies": 2, "judged": 2, "confirm": 1, "workers": 1,
 }  # fmt: skip
 
 
@@ -140,6 +147,8 @@ def test_a_guided_search_interrupted_goes_on_as_if_it_had_not_been(tmp_path):
     assert len(whole.tried) == 5
     best = min(objective for _, objective in whole.tried)
     assert (whole.best, best) in whole.tried
+    assert whole.confirmed == pytest.approx(whole.judged["guided"][:1], rel=1e-6)
+    assert whole.metrics["confirmed"] == whole.metrics["twin_mujoco_agreement"] == 1
     other = tmp_path / "interrupted"
     other.mkdir()
     for stop in (1, 3):
@@ -192,6 +201,7 @@ def test_guided_search_finds_the_minimum_of_a_bowl(tmp_path):
         ({"vary": ()}, "vary: expected at least one field"),
         ({"objective": "mean"}, "unknown objective 'mean'; valid choices: log, median"),
         ({"judged_from": 1}, "judged_from: expected seeds that the search does not use"),
+        ({"confirm": -1}, "confirm: expected an integer >= 0"),
         ({"vary": ("teaching.nois=log(1,2)",)}, "unknown field of Teaching 'nois'"),
     ],
 )
@@ -235,7 +245,7 @@ def test_errors_end_with_a_message(tmp_path):
     for options, text in (
         (["--store", tmp_path / "text.sqlite"], "damaged, or not a store"),
         (["--scheduler", "tcp://127.0.0.1:9"], "the address of a Dask scheduler"),
-        (["--score", "quadratic.orbit"], "unknown number of the metrics 'quadratic.orbit'"),
+        (["--score", "a.b"], "unknown number of the metrics 'a.b'; valid choices: "),
     ):
         done = run("search", "--set", *SET, "--seeds", "2", "--out", tmp_path, "--quiet", *options)
         assert done.returncode == 1

@@ -115,8 +115,8 @@ def test_a_trial_that_blows_up_is_an_outcome(tmp_path):
     (outcome,) = run.outcomes.values()
     assert (outcome.status, outcome.metrics) == ("diverged", {})
     assert "blew up after t = " in outcome.message
-    assert Score("*.orbit_error", 0.05).of(outcome) == float("inf")
-    assert Score("*.orbit_error", 0.05, maximise=True).of(outcome) == -float("inf")
+    assert Score("*/orbit_error", 0.05).of(outcome) == float("inf")
+    assert Score("*/orbit_error", 0.05, maximise=True).of(outcome) == -float("inf")
 
 
 def test_a_trial_that_cannot_run_ends_the_search_and_what_is_done_is_kept(tmp_path):
@@ -145,13 +145,13 @@ def test_other_versions_on_a_worker_are_named():
 
 def test_scores():
     outcome = evaluate(tiny_trials(1, task="all", free_run=20, window=19)[0])
-    score = Score("*.orbit_error", 0.05)
+    score = Score("*/orbit_error", 0.05)
     errors = [task["orbit_error"] for task in outcome.metrics.values() if isinstance(task, dict)]
     assert sorted(score.parts(outcome).values()) == sorted(errors)
     assert score.of(outcome) == max(errors)
-    assert Score("*.orbit_error", 0.05, maximise=True).of(outcome) == min(errors)
-    with pytest.raises(UnknownNameError, match=r"lissajous\.orbit_error"):
-        Score("*.orbit", 0.05).of(outcome)
+    assert Score("*/orbit_error", 0.05, maximise=True).of(outcome) == min(errors)
+    with pytest.raises(UnknownNameError, match=r"lissajous/orbit_error"):
+        Score("*/orbit", 0.05).of(outcome)
 
 
 def test_no_scheduler_there():

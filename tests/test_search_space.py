@@ -9,8 +9,7 @@ from hypothesis import strategies as st
 
 from mcmj.errors import InvalidArgumentError, McmjError, UnknownNameError
 from mcmj.experiments import limit_cycle_config, perturb, swing_up
-from mcmj.search.experiment import make_config
-from mcmj.search.overrides import numbers_at, override, parse_assignment, value_at
+from mcmj.search.overrides import override, parse_assignment, value_at
 from mcmj.search.space import Choices, Range, expand, parse_dimension
 from mcmj.search.summary import success_by_setting
 
@@ -97,28 +96,6 @@ def test_assignments():
     for text in ("nodes", "=3"):
         with pytest.raises(InvalidArgumentError, match="expected path=value"):
             parse_assignment(text)
-
-
-def test_search_defaults_leave_out_what_is_not_needed():
-    config = make_config("limit_cycle", {"task": "quadratic"})
-    assert (config.windows, config.measure_cost) == (0.0, False)
-    assert make_config("limit_cycle", {"windows": 50}).windows == 50.0
-
-
-METRICS = {
-    "a": {"error": 0.1, "n": 3},
-    "b": {"error": None},
-    "total": 2.0,
-    "list": [1.0],
-    "ok": True,
-}
-
-
-def test_numbers_by_path():
-    assert numbers_at(METRICS, "total") == {"total": 2.0}
-    assert numbers_at(METRICS, "*.error") == {"a.error": 0.1, "b.error": None}
-    with pytest.raises(UnknownNameError, match=r"valid choices: a\.error, a\.n, .*total"):
-        numbers_at(METRICS, "list")
 
 
 BOUNDS = st.tuples(st.floats(1e-9, 1e9), st.floats(1e-9, 1e9)).map(sorted)

@@ -296,13 +296,13 @@ def test_export(tmp_path):
         write_csv(store, tmp_path / "a.csv")
         write_parquet(store, tmp_path / "a.parquet")
         assert len(store) == 3
-    errors = columns["metrics.quadratic.orbit_error"]
+    errors = columns["metrics/quadratic/orbit_error"]
     assert sorted(errors) == [0.0, 0.1, 0.2]
     with (tmp_path / "a.csv").open(newline="") as file:
         rows = list(csv.DictReader(file))
-    assert [float(row["metrics.quadratic.orbit_error"]) for row in rows] == errors
+    assert [float(row["metrics/quadratic/orbit_error"]) for row in rows] == errors
     assert {row["config.teaching.noise"] for row in rows} == {"0.2"}
-    assert rows[0]["metrics.quadratic.windows"] == "[1.0, null]"
+    assert rows[0]["metrics/quadratic/windows"] == "[1.0, null]"
     parquet = pytest.importorskip("pyarrow.parquet")
     read = parquet.read_table(tmp_path / "a.parquet").to_pydict()
     assert read == columns

@@ -22,6 +22,7 @@ from mcmj.targets import Target
 from mcmj.teaching import Course, lessons_of, synchronise
 from mcmj.validation import Array
 
+SEARCH_SCORE = "worst_error/*"  # see mcmj.search.experiment
 LOST = np.zeros((0, len(LEGS)))  # outputs of a run that blew up
 
 

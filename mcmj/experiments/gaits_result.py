@@ -36,6 +36,15 @@ class Run:
     phase_lags: Array
     switched: int = 0
 
+    @property
+    def error(self) -> float:
+        """The larger of orbit and period error: how far the run ends from its gait.
+
+        The period counts because legs in phase or antiphase draw the same line in the space of
+        the outputs at any pace.
+        """
+        return max(self.errors["orbit_error"], self.errors["period_error"])
+
 
 @dataclass(frozen=True)
 class Taught:
@@ -76,26 +85,23 @@ class BodyResult:
             f"{first}_to_{second}": {**run.errors, "switching_time": run.time}
             for (first, second), run in self.switches.items()
         }
+        table["worst_error"] = self.worst_error
         return table
 
-    def successes(self, tolerance: float) -> dict[str, bool]:
-        """Whether all free runs, all switches and all runs from rest end in the gait."""
+    @property
+    def worst_error(self) -> dict[str, float]:
+        """The largest error of all free runs, of all switches and of all runs from rest."""
         runs = {
             "free_run": [gait.free for gait in self.gaits.values()],
             "switch": list(self.switches.values()),
             "from_rest": [gait.from_rest for gait in self.gaits.values()],
         }
-        good = {kind: all(arrived(run, tolerance) for run in some) for kind, some in runs.items()}
+        return {kind: max((run.error for run in some), default=0.0) for kind, some in runs.items()}
+
+    def successes(self, tolerance: float) -> dict[str, bool]:
+        """Whether all free runs, all switches and all runs from rest end in the gait."""
+        good = {kind: error < tolerance for kind, error in self.worst_error.items()}
         return {**good, "all": all(good.values())}
-
-
-def arrived(run: Run, tolerance: float) -> bool:
-    """Whether a run ends in its gait: orbit and period error below the tolerance.
-
-    The period counts because legs in phase or antiphase draw the same line in the space of
-    the outputs at any pace.
-    """
-    return max(run.errors["orbit_error"], run.errors["period_error"]) < tolerance
 
 
 @dataclass(frozen=True)
@@ -105,6 +111,17 @@ class Result:
     config: Config
     first: BodyResult
     outcomes: list[dict[str, object]]
+
+    @property
+    def body(self) -> Body:
+        """The first body."""
+        return self.first.body
+
+    @property
+    def readouts(self) -> dict[str, Array]:
+        """The first body's readouts by gait, of those that it has."""
+        gaits = self.first.gaits.items()
+        return {name: gait.w_out for name, gait in gaits if gait.w_out is not None}
 
     @property
     def metrics(self) -> dict[str, object]:
@@ -139,7 +156,7 @@ def outcome(result: BodyResult, seed: int, tolerance: float) -> dict[str, object
         ),
         "worst_switching_time": max((run.time for run in switches.values()), default=0),
         "switches_missed": [
-            f"{a}_to_{b}" for (a, b), run in switches.items() if not arrived(run, tolerance)
+            f"{a}_to_{b}" for (a, b), run in switches.items() if run.error >= tolerance
         ],
     }
 

@@ -9,7 +9,7 @@ import numpy as np
 from mcmj.errors import InvalidArgumentError, UnknownNameError
 from mcmj.rates import success_rate
 from mcmj.search.database import TrialStore
-from mcmj.search.experiment import Score, Trial, make_config
+from mcmj.search.experiment import Score, Trial, default_score, make_config
 from mcmj.search.overrides import override, parse_assignment, value_at
 from mcmj.search.runner import run_trials
 from mcmj.search.space import Space, parse_dimension
@@ -51,6 +51,7 @@ class Config:
         first_seed: of these bodies.
         judged: number of other bodies on which the best setting meets the hand-chosen one.
         judged_from: their first seed.
+        confirm: so many of them are run again in MuJoCo with the best setting; default: all.
         score, threshold, maximise: of a trial, as for a search.
         objective: of a setting, over its bodies: log (mean of log10 of the scores, at most 1
             each), success_rate or median.
@@ -71,7 +72,8 @@ class Config:
     first_seed: int = 0
     judged: int = 50
     judged_from: int = 1000
-    score: str = "*.orbit_error"
+    confirm: int | None = None
+    score: str | None = None
     threshold: float = 0.05
     maximise: bool = False
     objective: str = "log"
@@ -87,6 +89,8 @@ class Config:
             require_count(name, getattr(self, name), 1)
         for name in ("startup", "first_seed", "judged_from", "draw_seed"):
             require_count(name, getattr(self, name), 0)
+        if self.confirm is not None:
+            require_count("confirm", self.confirm, 0)
         require_number("threshold", self.threshold, -np.inf)
         if self.objective not in OBJECTIVES:
             raise UnknownNameError("objective", self.objective, OBJECTIVES)
@@ -111,7 +115,8 @@ class Config:
     @property
     def target(self) -> Score:
         """What a trial is after."""
-        return Score(self.score, self.threshold, self.maximise)
+        path = self.score or default_score(self.experiment)
+        return Score(path, self.threshold, self.maximise)
 
     @property
     def large_is_good(self) -> bool:
@@ -131,14 +136,15 @@ class Result:
         tried: settings and objectives in order.
         best: the best setting.
         judged: scores (bodies,) on other bodies, of "hand-chosen" and "guided".
-        confirmed: the latter's in MuJoCo; None without a choice of engine.
+        confirmed: the latter's of the first of these bodies in MuJoCo; empty without a choice
+            of engine.
     """
 
     config: Config
     tried: list[tuple[dict[str, object], float]]
     best: dict[str, object]
     judged: dict[str, Array]
-    confirmed: Array | None
+    confirmed: Array
 
     @property
     def metrics(self) -> dict[str, object]:
@@ -158,9 +164,9 @@ class Result:
                 "objective": judge(scores, score),
                 "scores": scores,
             }
-        if self.confirmed is not None:
-            guided = self.judged["guided"]
-            pairs = zip(self.confirmed, guided, strict=True)
+        if self.confirmed.size:
+            pairs = zip(self.confirmed, self.judged["guided"], strict=False)
+            table["confirmed"] = self.confirmed.size
             table["twin_mujoco_agreement"] = float(
                 np.mean([score.succeeds(a) == score.succeeds(b) for a, b in pairs])
             )
@@ -189,9 +195,9 @@ def run(
             finished is kept; the same call goes on from there.
     """
     hand = config.hand_chosen
-    account = plain([config.experiment, hand, sorted(config.vary), config.score, config.objective,
-                     config.bodies, config.first_seed, config.draw_seed, config.startup,
-                     config.maximise])  # fmt: skip
+    account = plain([config.experiment, hand, sorted(config.vary), config.target.path,
+                     config.objective, config.bodies, config.first_seed, config.draw_seed,
+                     config.startup, config.maximise])  # fmt: skip
     study = Study(
         config.study or folder / "study.sqlite", account, config.space, config.draw_seed,
         startup=config.startup, maximise=config.large_is_good,
@@ -218,9 +224,8 @@ def run(
             "guided": _scores(config, best, others, store, workers),
         }
         choice = getattr(hand, "engine", "mujoco") != "mujoco"
-        confirmed = (
-            _scores(config, best | {"engine": "mujoco"}, others, store, workers) if choice else None
-        )
+        in_mujoco, some = best | {"engine": "mujoco"}, others[: config.confirm]
+        confirmed = _scores(config, in_mujoco, some, store, workers) if choice else np.zeros(0)
     return Result(config, study.told, best, judged, confirmed)
 
 

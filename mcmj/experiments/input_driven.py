@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mcmj import metrics
+from mcmj.body import Body
 from mcmj.errors import DivergenceError, InvalidArgumentError
 from mcmj.experiments.input_driven_config import (
     SYSTEM,
@@ -25,6 +26,10 @@ from mcmj.simulation import Simulation
 from mcmj.targets import Target
 from mcmj.teaching import Lesson
 from mcmj.validation import Array
+
+# what a search over many bodies leaves out, and what it is after: see mcmj.search.experiment
+SEARCH_DEFAULTS = {"curve": (), "sweep": 0.0}
+SEARCH_SCORE = "eps/*/orbit_error"
 
 LEAD_IN = 20.0  # s, onto the cycle from which a body with a readout, or a sweep, sets out
 
@@ -99,6 +104,17 @@ class Result:
     config: Config
     first: BodyResult
     outcomes: list[Outcome]
+
+    @property
+    def body(self) -> Body:
+        """The first body."""
+        return self.first.start.body
+
+    @property
+    def readouts(self) -> dict[str, Array]:
+        """The readout that the first body runs, and others that its file holds, by name."""
+        own, others = self.config.readout_name, self.first.start.readouts
+        return {own: self.first.w_out, **{name: others[name] for name in others if name != own}}
 
     @property
     def metrics(self) -> dict[str, object]:

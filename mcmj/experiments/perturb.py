@@ -20,6 +20,9 @@ from mcmj.targets import TARGETS, Target, target
 from mcmj.teaching import Teaching, teach
 from mcmj.validation import Array, require_count, require_number
 
+# what a search over many bodies leaves out, see mcmj.search.experiment
+SEARCH_DEFAULTS = {"noise_curve": ()}
+
 # chosen by the recoveries of bodies 0 to 19 and 100 to 239, on the twin
 DRAWN = BodySettings(nodes=20, feedback_fraction=0.5, d1=(0.1, 2.0))
 TAUGHT = Teaching(

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from mcmj.experiments.search_config import Config
-from mcmj.experiments.search_cost import overhead
+from mcmj.experiments.search_cost import affordable, overhead
 from mcmj.experiments.search_result import Confirmation, Result, ranking_of
 from mcmj.search.database import TrialStore
 from mcmj.search.experiment import DIVERGED, Outcome, Score, Trial, trained_body
@@ -54,7 +54,8 @@ def run(
         checked = _confirm(config, trials, scores, kept, workers, tell)
         order = ranking_of(score, scores, checked)[: config.best]
         bodies = _bodies(config, trials, scores, checked, order, workers)
-        cost = overhead(trials[: config.cost_trials], workers) if config.cost_trials else None
+        number = affordable([one.seconds for one in outcomes[: config.cost_trials]])
+        cost = overhead(trials[:number], workers) if number else None
         shape = (len(config.settings), config.seeds)
         return Result(
             config=config,
@@ -130,7 +131,7 @@ def _bodies(
             continue
         account: Mapping[str, Any] = {
             "searched": len(trials),
-            "score": config.score,
+            "score": config.target.path,
             "screened": float(scores[index]),
             "confirmed": confirmed.get(index),
         }

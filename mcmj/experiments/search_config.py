@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from mcmj.errors import InvalidArgumentError
-from mcmj.search.experiment import Score, Trial, make_config
+from mcmj.search.experiment import Score, Trial, default_score, make_config
 from mcmj.search.overrides import override, parse_assignment
 from mcmj.search.space import Space, expand, parse_dimension
 from mcmj.validation import require_count, require_number
@@ -24,7 +24,8 @@ class Config:
         draws: random settings, if there are ranges.
         seeds: number of bodies of each setting.
         first_seed: their seeds are consecutive from here.
-        score: dotted path into the metrics; "*" stands for every key, and the worst counts.
+        score: path into the metrics, as in quadratic/orbit_error; "*" stands for every key, and
+            the worst counts; default: what the experiment asks for.
         threshold: a success is below it.
         maximise: large scores are good, and a success is above the threshold.
         engine: that screens, if the experiment has a choice: twin or mujoco.
@@ -33,7 +34,8 @@ class Config:
             engines disagree.
         best: number of bodies written and drawn.
         draw_seed: of random settings and of the audit.
-        cost_trials: number of trials run again to measure what searching costs on top.
+        cost_trials: number of trials run again to measure what searching costs on top; fewer,
+            or none, where that would take over a minute.
         workers: processes, one thread each; default: one a core.
         scheduler: address of a Dask scheduler; then its workers run the trials.
         store: file that keeps all trials; default: trials.sqlite in the output folder.
@@ -45,7 +47,7 @@ class Config:
     draws: int = 20
     seeds: int = 50
     first_seed: int = 0
-    score: str = "*.orbit_error"
+    score: str | None = None
     threshold: float = 0.05
     maximise: bool = False
     engine: str = "twin"
@@ -59,9 +61,9 @@ class Config:
     store: Path | None = None
 
     def __post_init__(self) -> None:
-        for name in ("seeds", "draws", "best"):
+        for name in ("seeds", "draws"):
             require_count(name, getattr(self, name), 1)
-        for name in ("first_seed", "draw_seed", "confirm", "audit", "cost_trials"):
+        for name in ("first_seed", "draw_seed", "confirm", "audit", "best", "cost_trials"):
             require_count(name, getattr(self, name), 0)
         require_number("threshold", self.threshold, -np.inf)
         if self.workers is not None:
@@ -91,7 +93,8 @@ class Config:
     @property
     def target(self) -> Score:
         """What the search is after."""
-        return Score(self.score, self.threshold, self.maximise)
+        path = self.score or default_score(self.experiment)
+        return Score(path, self.threshold, self.maximise)
 
     @property
     def trials(self) -> list[Trial]:

@@ -13,6 +13,12 @@ from mcmj.search.runner import run_trials
 from mcmj.search.workers import Workers, results
 
 REPEATS = 3
+BUDGET = 60.0  # s of work that a measurement may take
+
+
+def affordable(seconds: Sequence[float]) -> int:
+    """How many of the first trials, which took so long [s], `overhead` can run within BUDGET."""
+    return int(np.searchsorted(2 * REPEATS * np.cumsum(seconds), BUDGET, side="right"))
 
 
 def bare_seconds(trials: Sequence[Trial]) -> float:

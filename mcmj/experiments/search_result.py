@@ -101,6 +101,7 @@ class Result:
         """As written to metrics.json."""
         total = self.success["all"]
         return {
+            "score": self.config.target.path,
             "trials": self.scores.size,
             "evaluated": self.evaluated,
             "diverged": self.diverged,

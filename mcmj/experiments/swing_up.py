@@ -20,6 +20,10 @@ from mcmj.teaching import Course, lessons_of
 from mcmj.threads import in_threads
 from mcmj.validation import Array, require_count, require_number
 
+# what a search over many bodies leaves out, and what it is after: see mcmj.search.experiment
+SEARCH_DEFAULTS = {"kicks": 0}
+SEARCH_SCORE = "tasks/*/orbit_error"
+
 TAUGHT = Teaching(duration=240.0, rest_runs=2, rest_duration=30.0, rest_weight=1e-2)
 
 
@@ -96,11 +100,13 @@ class SwingUp:
         orbit_error: of the last part; infinite if it blew up.
         swing_up_time: until the outputs stay within the tolerance of the orbit [s], infinite
             if they do not.
+        w_out: the readout after practice; None if teaching blew up.
         practice_errors: of the trials, see mcmj.practice; empty if teaching blew up.
         kicked_fraction: of the kicked starts, that came to the orbit; None without any.
     """
 
     target: Target
+    w_out: Array | None
     outputs: Array
     orbit_error: float
     swing_up_time: float
@@ -114,6 +120,17 @@ class Result:
 
     config: Config
     bodies: list[dict[str, SwingUp]]
+
+    @property
+    def body(self) -> Body:
+        """The first body."""
+        return limit_cycle.get_body(self.config.of_seed(0))[0]
+
+    @property
+    def readouts(self) -> dict[str, Array]:
+        """The first body's readouts by task, of those that were taught."""
+        tasks = self.bodies[0].items()
+        return {name: task.w_out for name, task in tasks if task.w_out is not None}
 
     @property
     def metrics(self) -> dict[str, object]:
@@ -196,7 +213,7 @@ def _swing_up(config: Config, body: Body, wanted: Target, seed: int, on_steps: O
     try:
         course.attend_all(lessons_of(wanted, config.teaching), on_steps=on_steps)
     except DivergenceError:
-        return SwingUp(wanted, np.zeros((0, 2)), np.inf, np.inf, (), None)
+        return SwingUp(wanted, None, np.zeros((0, 2)), np.inf, np.inf, (), None)
     practised = practise(course, wanted, config.practice, on_steps=on_steps)
     outputs = _free_run(config, simulation, None, on_steps)
     speeds = stream(seed, "initial_state")
@@ -210,6 +227,7 @@ def _swing_up(config: Config, body: Body, wanted: Target, seed: int, on_steps: O
     errors = [_end_error(config, run, wanted) for run in kicked]
     return SwingUp(
         target=wanted,
+        w_out=practised.fit.w_out,
         outputs=outputs,
         orbit_error=_end_error(config, outputs, wanted),
         swing_up_time=np.inf if not len(outputs) else metrics.recovery_time(

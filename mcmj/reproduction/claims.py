@@ -10,7 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from mcmj.errors import McmjError, UnknownNameError
+from mcmj.errors import UnknownNameError
+from mcmj.metricpath import numbers_at
 from mcmj.rates import success_rate
 
 FORMATS = {"error": "{:.2%}", "time": "{:.1f} s", "ratio": "{:.3f}"}
@@ -40,8 +41,7 @@ class Claim:
         text: what is claimed.
         paper: the paper's value, or its words.
         run: name of the run whose metrics hold ours.
-        paths: in them, keys joined by "/", each to a number or a list of numbers; all are taken
-            together.
+        paths: into them, see mcmj.metricpath; all numbers that they lead to are taken together.
         kind: of number, one of FORMATS.
         limit: a value at or below it is a success; None counts as a failure.
         needed: the claim holds unless the successes refute this rate: unless the upper end of
@@ -112,38 +112,14 @@ def judge(claim: Claim, metrics: Mapping[str, object]) -> Outcome:
     """Look up a claim's numbers in a run's metrics and count the successes.
 
     Raises:
-        McmjError: the metrics have no such number.
+        UnknownNameError: the metrics have no such number.
     """
-    values = tuple(value for path in claim.paths for value in numbers_at(metrics, path))
+    found = [x for path in claim.paths for x in numbers_at(metrics, path).values()]
+    values = tuple(np.inf if x is None else x for x in found)
     good = [value <= claim.limit for value in values]
     rate: dict[str, Any] = success_rate(good)
     holds = all(good) if claim.needed == 1.0 else rate["interval_95"][1] >= claim.needed
     return Outcome(claim, values, rate, holds)
-
-
-def numbers_at(metrics: Mapping[str, object], path: str) -> list[float]:
-    """Numbers at a path of keys joined by "/", a null being infinite; `*`: every key or item.
-
-    Raises:
-        McmjError: there is nothing, or no number, at that path.
-    """
-    found: list[object] = [metrics]
-    for key in path.split("/"):
-        found = [inner for outer in found for inner in _inside(outer, key, path)]
-    items = [item for each in found for item in (each if isinstance(each, list) else [each])]
-    if not items or not all(item is None or isinstance(item, int | float) for item in items):
-        raise McmjError(f"metric {path!r} is no number, and no list of numbers")
-    return [np.inf if item is None else float(item) for item in items]  # type: ignore[arg-type]
-
-
-def _inside(outer: object, key: str, path: str) -> list[object]:
-    if key == "*" and isinstance(outer, Mapping):
-        return list(outer.values())
-    if key == "*" and isinstance(outer, list):
-        return outer
-    if isinstance(outer, Mapping) and key in outer:
-        return [outer[key]]
-    raise McmjError(f"no metric {path!r}: {key!r} is missing")
 
 
 def chosen(parts: Sequence[Part], only: Sequence[str]) -> list[Part]:

@@ -24,7 +24,7 @@ FIG5 = Part(
     ),
     (
         *_of_tasks("the general body generates {}", "limit_cycle", "{}/orbit_error"),
-        *_of_tasks("random bodies generate {}", "success_rate", "{}/orbit_errors"),
+        *_of_tasks("random bodies generate {}", "success_rate", "{}/orbit_errors/*"),
     ),
 )
 LONG = Part(
@@ -59,12 +59,12 @@ FIG6 = Part(
     ),
     (
         *(
-            Claim(f"back after {text}", RETURNS, "perturb", (f"seeds/{name}/orbit_errors",))
+            Claim(f"back after {text}", RETURNS, "perturb", (f"seeds/{name}/orbit_errors/*",))
             for name, text in DISTURBED.items()
         ),
         *(
             Claim(f"time back after {text}", RETURNS, "perturb",
-                  (f"seeds/{name}/recovery_times",), kind="time", limit=40.0)
+                  (f"seeds/{name}/recovery_times/*",), kind="time", limit=40.0)
             for name, text in DISTURBED.items()
         ),
     ),
@@ -80,7 +80,7 @@ FIG7 = Part(
         ),
     ),
     _of_tasks(
-        "from rest onto {}", "swing_up", "seeds/{}/orbit_errors", "shown for one body"
+        "from rest onto {}", "swing_up", "seeds/{}/orbit_errors/*", "shown for one body"
     ),
 )  # fmt: skip
 GAIT_RUNS = (
@@ -124,7 +124,7 @@ FIG10 = Part(
         ),
         *(
             Claim(f"random bodies, eps = {eps}", "not given", "input_seeds",
-                  (f"rates/{eps}/orbit_errors",))
+                  (f"rates/{eps}/orbit_errors/*",))
             for eps in ("5", "1", "0.2")
         ),
     ),

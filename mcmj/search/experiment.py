@@ -7,6 +7,7 @@ their full ones ("my_package.my_experiment"). What it may have besides:
     Config.engine       "mujoco" or "twin": screened with the twin, confirmed in MuJoCo
     Config.seed         of the body, as `search` varies it
     SEARCH_DEFAULTS     dotted paths of Config -> values that leave out what a search needs not
+    SEARCH_SCORE        what a search is after unless told otherwise, see Score.path
     result.body, result.readouts    the trained body, and its readouts by name, to write it
 """
 
@@ -34,12 +35,14 @@ from mcmj.errors import (
     UnknownNameError,
 )
 from mcmj.generator import draw_body
+from mcmj.metricpath import matched, numbers_at, quantity
 from mcmj.mjcf import to_mjcf
 from mcmj.options import DEFAULT_INTEGRATOR
-from mcmj.search.overrides import numbers_at, override
+from mcmj.search.overrides import override
 from mcmj.store import plain, versions
 
 PACKAGE = "mcmj.experiments"
+ORBIT_ERRORS = "*/orbit_error"
 DONE, DIVERGED = "done", "diverged"
 
 
@@ -66,6 +69,11 @@ def make_config(name: str, changes: Mapping[str, object]) -> Any:
     """The config of a trial: the experiment's own, its search defaults, then the changes."""
     module = load_experiment(name)
     return override(module.Config(), {**getattr(module, "SEARCH_DEFAULTS", {}), **changes})
+
+
+def default_score(name: str) -> str:
+    """The path of the score that an experiment asks for, or else its orbit errors."""
+    return getattr(load_experiment(name), "SEARCH_SCORE", ORBIT_ERRORS)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -159,8 +167,7 @@ class Score:
     """The number that a search is after.
 
     Attributes:
-        path: dotted path into the metrics; "*" for every key that leads to a number, and then
-            the worst of them.
+        path: into the metrics, see mcmj.metricpath; where it has a "*", the worst number counts.
         threshold: a success is below it (above it, if maximised).
         maximise: large is good.
     """
@@ -168,6 +175,11 @@ class Score:
     path: str
     threshold: float
     maximise: bool = False
+
+    @property
+    def name(self) -> str:
+        """Of the number, for people."""
+        return quantity(self.path)
 
     @property
     def worst(self) -> float:
@@ -184,6 +196,10 @@ class Score:
             return {}
         found = numbers_at(outcome.metrics, self.path)
         return {path: self.worst if x is None else x for path, x in found.items()}
+
+    def label(self, part: str) -> str:
+        """What sets a part apart from the others."""
+        return matched(part, self.path)
 
     def of(self, outcome: Outcome) -> float:
         """The worst of the parts."""

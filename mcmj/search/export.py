@@ -14,7 +14,8 @@ from mcmj.store import whole_file
 def table(store: TrialStore) -> dict[str, list[Any]]:
     """Columns by name, one entry a trial; None where a trial has no such number.
 
-    Nested fields have dotted names: config.teaching.noise, metrics.quadratic.orbit_error.
+    Columns of nested fields are named as everywhere: config.teaching.noise by dots, and
+    metrics/quadratic/orbit_error as the path of a score.
     """
     rows = [_cells(row) for row in store.rows()]
     names = dict.fromkeys(name for row in rows for name in row)
@@ -46,15 +47,19 @@ def write_parquet(store: TrialStore, path: str | Path) -> None:
         parquet.write_table(pyarrow.table(columns), temporary)
 
 
-def _cells(row: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
-    """Nested dictionaries as one level of dotted names; lists as JSON text."""
+def _cells(row: Mapping[str, Any]) -> dict[str, Any]:
+    """Nested dictionaries as one level; lists as JSON text."""
     cells: dict[str, Any] = {}
     for name, value in row.items():
-        if isinstance(value, Mapping):
-            cells |= _cells(value, f"{prefix}{name}.")
-        else:
-            cells[prefix + name] = json.dumps(value) if isinstance(value, list) else value
+        cells |= _flat(value, name, "/" if name == "metrics" else ".")
     return cells
+
+
+def _flat(value: object, name: str, joint: str) -> dict[str, Any]:
+    if isinstance(value, Mapping):
+        parts = [_flat(item, f"{name}{joint}{key}", joint) for key, item in value.items()]
+        return {key: cell for part in parts for key, cell in part.items()}
+    return {name: json.dumps(value) if isinstance(value, list) else value}
 
 
 def _one_type(values: list[Any]) -> list[Any]:

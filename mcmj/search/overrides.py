@@ -1,18 +1,16 @@
-"""Fields of nested frozen dataclasses by dotted path, and numbers of nested metrics likewise."""
+"""Fields of nested frozen dataclasses by dotted path, as in teaching.noise."""
 
 import dataclasses
 import functools
 import json
 import types
 import typing
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from typing import Any, TypeVar
 
 from mcmj.errors import InvalidArgumentError, UnknownNameError
 
 C = TypeVar("C")
-
-ANY = "*"
 
 
 def override(config: C, changes: Mapping[str, object]) -> C:
@@ -75,21 +73,6 @@ def fitted(path: str, value: object, hint: Any) -> object:
         raise InvalidArgumentError(
             path, getattr(hint, "__name__", str(hint)), repr(value)
         ) from None
-
-
-def numbers_at(metrics: Mapping[str, object], path: str) -> dict[str, float | None]:
-    """All numbers at a dotted path into nested metrics, by their full paths.
-
-    "*" stands for every key below which the rest of the path leads to a number; None stands
-    for a number that is not finite, as in metrics.json.
-
-    Raises:
-        UnknownNameError: the path leads to no number; the message lists those that do.
-    """
-    found = dict(_numbers(metrics, path.split("."), ""))
-    if not found:
-        raise UnknownNameError("number of the metrics", path, sorted(_leaves(metrics, "")))
-    return found
 
 
 # --- inside ----------------------------------------------------------------------------------
@@ -160,24 +143,3 @@ def _fit_tuple(value: object, hints: tuple[Any, ...]) -> tuple[object, ...]:
     if len(value) != len(hints):
         raise TypeError
     return tuple(_fit(item, hint) for item, hint in zip(value, hints, strict=True))
-
-
-def _numbers(node: object, path: list[str], at: str) -> Iterator[tuple[str, float | None]]:
-    if not path:
-        if node is None:
-            yield at, None
-        elif isinstance(node, int | float) and not isinstance(node, bool):
-            yield at, float(node)
-        return
-    if isinstance(node, Mapping):
-        for name in node if path[0] == ANY else [path[0]]:
-            if name in node:
-                yield from _numbers(node[name], path[1:], f"{at}.{name}" if at else name)
-
-
-def _leaves(node: object, at: str) -> Iterator[str]:
-    if isinstance(node, Mapping):
-        for name, item in node.items():
-            yield from _leaves(item, f"{at}.{name}" if at else name)
-    elif isinstance(node, int | float):
-        yield at
