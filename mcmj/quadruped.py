@@ -110,7 +110,7 @@ def quadruped_mjcf(robot: Quadruped) -> str:
 
     Names: body trunk; per leg bodies LF, LF_lower, joints LF_hip, LF_leg, user actuators
     LF_swing, LF_lift, affine ones LF_hip_servo, LF_leg_servo; sensors LF_length, LF_rate of the
-    leg's joint, then LF_contact. Only feet touch, and only the ground (see mcmj.walker).
+    leg's joint, then LF_contact. Only feet touch, and only the ground (see mcmj.walkscene).
     """
     legs = "".join(_leg(robot, name) for name in LEGS)
     actuators = "".join(_actuators(robot, name) for name in LEGS)

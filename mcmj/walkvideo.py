@@ -16,8 +16,8 @@ from mcmj.errors import McmjError
 from mcmj.gaits import LEGS
 from mcmj.store import whole_file
 from mcmj.validation import Array
-from mcmj.walker import GROUND_GROUP, ROBOT
 from mcmj.walkmetrics import Walk
+from mcmj.walkscene import GROUND_GROUP, ROBOT
 
 Frame = npt.NDArray[np.uint8]
 

@@ -60,6 +60,9 @@ CHAINS = (
     (("theory", "capacity", "filter_tasks"), ("probing",)),
     (("targets", "profiles"), ("driven",)),
     (("teaching", "driven"), ("experiments.input_lessons",)),
+    (("walkscene",), ("walklaw",)),
+    (("walklaw", "walkmetrics", "legs"), ("walker",)),
+    (("walker",), ("grounding",)),
 )
 MUJOCO = {
     "alteration",
@@ -78,6 +81,7 @@ MUJOCO = {
     "structs",
     "viewer",
     "walker",
+    "walkscene",
     "walkvideo",
 }
 

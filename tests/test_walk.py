@@ -8,15 +8,16 @@ import pytest
 
 from mcmj.bodyfile import body_of_model, load_model, readouts_of_model
 from mcmj.errors import InvalidArgumentError, UnknownNameError
-from mcmj.experiments.walk_adapt import recovery
 from mcmj.experiments.walk_config import Config
+from mcmj.experiments.walk_recover import distances_from, recovery
 from mcmj.gaits import LEGS, gait_target
 from mcmj.legs import LegReadout, lift_of, teach_lift
 from mcmj.library import body_path
 from mcmj.quadruped import Quadruped, Stride
 from mcmj.simulation import Simulation
-from mcmj.walker import Terrain, Walker
+from mcmj.walker import Walker
 from mcmj.walkmetrics import Walk, costs_of_transport, distances, fall_times, phase_shift, turns
+from mcmj.walkscene import Terrain
 
 ROBOT = Quadruped()
 
@@ -148,7 +149,9 @@ def test_phase_shift_and_recovery_of_made_up_rhythms():
     assert phase_shift(walk, 1.0, 1) == pytest.approx(0.1, abs=1e-6)
     circle = np.column_stack([np.cos(2 * np.pi * times), np.sin(2 * np.pi * times)])
     kicked = circle * (1 + 0.5 * np.exp(-times))[:, None]
-    assert recovery(kicked, circle, 0.01) == pytest.approx(np.log(5.0), abs=0.02)
+    away = distances_from(circle, kicked)
+    assert away[0] == pytest.approx(0.5, abs=0.01)
+    assert recovery(away, 0.01) == pytest.approx(np.log(0.5 / 0.03), abs=0.02)
 
 
 def test_a_leg_is_lifted_when_its_output_rises():
