@@ -75,7 +75,7 @@ def _paint_squares(spec: mujoco.MjSpec, side: float) -> None:
     spec.add_texture(
         name="squares", type=mujoco.mjtTexture.mjTEXTURE_2D,
         builtin=mujoco.mjtBuiltin.mjBUILTIN_CHECKER,
-        rgb1=[0.97, 0.97, 0.95], rgb2=[0.9, 0.91, 0.89], width=64, height=64,
+        rgb1=[0.78, 0.78, 0.76], rgb2=[0.71, 0.72, 0.70], width=64, height=64,
     )  # fmt: skip
     textures = [""] * mujoco.mjtTextureRole.mjNTEXROLE
     textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = "squares"

@@ -7,13 +7,14 @@ from itertools import permutations
 from mcmj.body import Body
 from mcmj.bodyfile import body_of_model, load_model, readouts_of_model
 from mcmj.errors import InvalidArgumentError, UnknownNameError
-from mcmj.gaits import GAITS, LEGS, gait_target
+from mcmj.gaits import GAITS, LEGS
 from mcmj.library import body_path
 from mcmj.quadruped import Quadruped
 from mcmj.validation import Array, require_count, require_number
 from mcmj.walker import PUSH_DURATION
 
 PARTS = ("walk", "switch", "push", "adapt", "recover", "steps", "cost")
+SHORTEST = 15.5  # s of the body as it was taught in which a stride is measured: three of a walk
 
 
 @dataclass(frozen=True)
@@ -80,8 +81,7 @@ class Config:
             require_number(name, getattr(self, name), 0.0, open_low=True)
         require_number("survive", self.survive, 2 * PUSH_DURATION)
         if {"adapt", "recover"} & set(self.parts):
-            slowest = max(gait_target(name).period for name in self.gaits) / self.pace
-            require_number("after", self.after, 3 * slowest)
+            require_number("after", self.after, SHORTEST / self.pace)
         for name in ("settle", "nudge"):
             require_number(name, getattr(self, name), 0.0)
         require_number("coupling", self.coupling, -10.0, 10.0)
