@@ -65,40 +65,42 @@ def pushes(survived: Mapping[str, Mapping[str, int]], total: int) -> Figure:
     return figure
 
 
-def responses(table: Mapping[str, Any], key: str, ylabel: str, *, relative: bool) -> Figure:
-    """How a quantity of each gait answers slope and load, without coupling and with it.
+def stride_periods(table: Mapping[str, Any]) -> Figure:
+    """How the stride period of each gait answers slope and load, without coupling and with it.
 
-    Symbols are medians over the starts, bars their range; nothing is drawn where all fell.
+    Symbols are medians over the starts, bars their range, cut off where the figure ends. Each
+    panel has a scale of its own.
 
     Args:
         table: of the part adapt.
-        key: of the quantity in its rows.
-        relative: its change over its value on level ground, else its change, both in percent.
     """
     figure = new_figure(11.0, 5.0)
-    grid = figure.subplots(2, len(table), sharex="row", sharey=True, squeeze=False)
+    grid = figure.subplots(2, len(table), sharex="row", squeeze=False)
     for column, (name, by_coupling) in enumerate(table.items()):
         for axes, (cause, unit) in zip(grid[:, column], CAUSES.items(), strict=True):
+            largest = 0.0
             for label, style in STYLES.items():
-                places, median, low, high = _changes(by_coupling[label][cause], key, relative)
+                places, median, low, high = _changes(by_coupling[label][cause])
                 errors = (median - low, high - median)
                 axes.errorbar(places, median, errors, capsize=3, label=label, **style)
+                largest = np.nanmax([largest, *np.abs(median)])
             axes.axhline(0, color="black", lw=0.6, zorder=0)
-            axes.set(xlabel=unit)
+            limit = 1.5 * largest or 1.0
+            axes.set(xlabel=unit, ylim=(-limit, limit))
             _plain(axes)
         grid[0, column].set_title(name)
-    figure.supylabel(ylabel, fontsize="medium")
+    figure.supylabel("change of the stride period [%]", fontsize="medium")
     figure.legend(*grid[0, 0].get_legend_handles_labels(), loc="outside upper center", ncols=2,
                   frameon=False)  # fmt: skip
     return figure
 
 
-def _changes(rows: Mapping[str, Any], key: str, relative: bool) -> Array:
+def _changes(rows: Mapping[str, Any]) -> Array:
     """Places, and median, low and high there, as changes [%] from the median at 0; NaN: fell."""
-    spreads = [[row[key][part] for part in ("median", "low", "high")] for row in rows.values()]
+    spreads = [[row["stride_period_s"][part] for part in ("median", "low", "high")]
+               for row in rows.values()]  # fmt: skip
     values = np.array(spreads, dtype=np.float64)
-    level = values[list(rows).index("0"), 0]
-    changes = 100 * (values - level) / (level if relative else 1.0)
+    changes = 100 * (values / values[list(rows).index("0"), 0] - 1)
     return np.column_stack([[float(place) for place in rows], changes]).T
 
 

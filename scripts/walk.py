@@ -16,7 +16,7 @@ from mcmj.experiments.walk import Result, run, tour
 from mcmj.experiments.walk_config import Config, total_steps
 from mcmj.plotting import save
 from mcmj.progress import progress_bar
-from mcmj.walkplot import footfalls, phase_responses, pushes, responses
+from mcmj.walkplot import footfalls, phase_responses, pushes, stride_periods
 
 SHOWN = 4.0  # seconds of footfalls in the figure
 
@@ -45,15 +45,7 @@ def draw(result: Result, out: Path) -> None:
         counts = {name: table["push"][name]["survived"] for name in result.config.gaits}
         save(pushes(counts, result.config.seeds), out / "pushes.png")
     if "adapt" in table:
-        period, lag = (
-            responses(table["adapt"], key, f"change of {what}", relative=relative)
-            for key, what, relative in (
-                ("stride_period_s", "the stride period [%]", True),
-                ("ground_lag", "the feet's lag behind the outputs [% of a stride]", False),
-            )
-        )
-        save(period, out / "adapt.png")
-        save(lag, out / "adapt_phase.png")
+        save(stride_periods(table["adapt"]), out / "adapt.png")
     if "recover" in table:
         save(phase_responses(table["recover"], result.config.nudge), out / "recover.png")
 

@@ -272,7 +272,7 @@ def test_walk(tmp_path):
         pushed = metrics["recover"]["trot"][label]["sideways"]
         assert pushed == {"falls": 1, "deviation": [None], "recovery_s": [None],
                           "phase_shift": [None]}  # fmt: skip
-    for figure in ("footfalls.png", "adapt.png", "adapt_phase.png", "recover.png"):
+    for figure in ("footfalls.png", "adapt.png", "recover.png"):
         assert (tmp_path / figure).stat().st_size > 10_000
 
 

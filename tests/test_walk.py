@@ -27,6 +27,7 @@ from mcmj.walkmetrics import (
     turns,
 )
 from mcmj.walkscene import Terrain
+from mcmj.walkvideo import BAR, MARK, Event, GaitDiagram
 
 ROBOT = Quadruped()
 
@@ -224,6 +225,21 @@ def test_phase_shift_and_recovery_of_made_up_rhythms():
     away = distances_from(circle, kicked)
     assert away[0] == pytest.approx(0.5, abs=0.01)
     assert recovery(away, 0.01) == pytest.approx(np.log(0.5 / 0.03), abs=0.02)
+
+
+def test_the_diagram_of_a_film_closes_bounces_and_marks_switches():
+    contact = np.zeros((1, 300, 4))
+    contact[0, :, 0] = 1.0
+    contact[0, 100:102, 0] = 0.0  # a bounce
+    contact[0, 150:, 1] = 1.0
+    walk = made_up(poses(300), contact=contact)
+    picture = GaitDiagram(walk, [Event(0.0, "walk"), Event(2.0, "trot")]).draw(3.0).astype(int)
+    blue = (np.abs(picture - BAR).sum(axis=-1) < 10).sum(axis=1)  # pixels in a line
+    lines = blue[blue > 0].reshape(2, -1)  # two legs that stand, each bar as high
+    assert np.ptp(lines, axis=1).max() == 0
+    assert lines[0, 0] == pytest.approx(2 * lines[1, 0], rel=0.02)
+    marked = (np.abs(picture - MARK).sum(axis=-1) < 10).sum(axis=0)
+    assert marked.argmax() == pytest.approx(40 + (320 - 48) * 2 / 3, abs=2)
 
 
 def test_a_leg_is_lifted_when_its_output_rises():

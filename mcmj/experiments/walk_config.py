@@ -44,7 +44,7 @@ class Config:
         loads: on the trunk for adapt, beside none [kg].
         starts: moments of the stride at which adapt puts the robot on each ground.
         nudge: pushes of recover [N s].
-        steps_ms: time steps for steps, of the body as it was taught [ms].
+        steps_ms: time steps for steps, beside timestep, of the body as it was taught [ms].
         robot: its sizes and servos.
     """
 
@@ -67,7 +67,7 @@ class Config:
     loads: tuple[float, ...] = (25.0, 50.0)
     starts: int = 2
     nudge: float = 150.0
-    steps_ms: tuple[float, ...] = (0.5, 1.0, 2.0)
+    steps_ms: tuple[float, ...] = (0.5, 2.0)
     robot: Quadruped = field(default_factory=Quadruped)
 
     def __post_init__(self) -> None:
