@@ -16,14 +16,12 @@ from mcmj.walker import Walker
 from mcmj.walkmetrics import Walk
 from mcmj.walkscene import Terrain
 
-LABELS = ("uncoupled", "coupled")
-
 
 def adapt(lesson: Lesson, name: str, on_steps: OnSteps = lambda steps: None) -> Table:
     """One gait on slopes [degrees] and with loads [kg], without coupling and with it."""
     return {
         label: _response(lesson, name, coupling, on_steps)
-        for label, coupling in zip(LABELS, (0.0, lesson.config.coupling), strict=True)
+        for label, coupling in lesson.couplings.items()
     }
 
 

@@ -48,6 +48,11 @@ class Lesson:
         """Of a gait at the robot's pace [s]."""
         return gait_target(gait).period / self.config.pace
 
+    @property
+    def couplings(self) -> dict[str, float]:
+        """Without and with the legs' loads in the body."""
+        return {"uncoupled": 0.0, "coupled": self.config.coupling}
+
     def gait(self, name: str, coupling: float) -> LegReadout:
         """The readouts for a body with that coupling."""
         return self.grounded[name] if coupling else self.gaits[name]

@@ -17,7 +17,6 @@ from mcmj.walkmetrics import Walk
 TOLERANCE = 0.03  # distance from the orbit, over its RMS radius
 STRIDES = 4  # at the end, by which phases are compared
 DIRECTIONS = {"forwards": (1.0, 0.0), "sideways": (0.0, 1.0)}
-LABELS = ("uncoupled", "coupled")
 
 
 def recover(lesson: Lesson, name: str, on_steps: OnSteps = lambda steps: None) -> Table:
@@ -29,7 +28,7 @@ def recover(lesson: Lesson, name: str, on_steps: OnSteps = lambda steps: None) -
     moments = np.arange(config.moments) / config.moments
     return {"moments": moments} | {
         label: _pushed(lesson, name, coupling, moments * lesson.period(name), on_steps)
-        for label, coupling in zip(LABELS, (0.0, config.coupling), strict=True)
+        for label, coupling in lesson.couplings.items()
     }
 
 
