@@ -67,6 +67,9 @@ CHAINS = (
     (("targets", "profiles"), ("driven",)),
     (("teaching", "driven"), ("experiments.input_lessons",)),
     (("environment_setting", "environment_task"), ("environment",)),
+    (("walkscene",), ("walklaw",)),
+    (("walklaw", "walkmetrics", "legs"), ("walker",)),
+    (("walker",), ("grounding",)),
 )
 MUJOCO = {
     "alteration",
@@ -85,6 +88,7 @@ MUJOCO = {
     "structs",
     "viewer",
     "walker",
+    "walkscene",
     "walkvideo",
 }
 
