@@ -21,6 +21,7 @@ from mcmj.mjcf import numbers
 from mcmj.validation import Array, as_array, require_number
 
 GRAVITY = 9.81  # m/s^2
+ROBOT_GROUP = 1  # of geoms, for renderers that show nothing else
 
 
 @dataclass(frozen=True)
@@ -110,7 +111,7 @@ def quadruped_mjcf(robot: Quadruped) -> str:
 
     Names: body trunk; per leg bodies LF, LF_lower, joints LF_hip, LF_leg, user actuators
     LF_swing, LF_lift, affine ones LF_hip_servo, LF_leg_servo; sensors LF_length, LF_rate of the
-    leg's joint, then LF_contact. Only feet touch, and only the ground (see mcmj.walker).
+    leg's joint, then LF_contact. Only feet touch, and only the ground (see mcmj.walkscene).
     """
     legs = "".join(_leg(robot, name) for name in LEGS)
     actuators = "".join(_actuators(robot, name) for name in LEGS)
@@ -120,10 +121,13 @@ def quadruped_mjcf(robot: Quadruped) -> str:
     ) + "".join(f'<touch name="{n}_contact" site="{n}_foot"/>' for n in LEGS)
     size = numbers([1.2 * robot.hip_x, 0.5 * robot.hip_y, 0.12 * robot.leg])
     return f"""<mujoco model="quadruped">
-  <default><geom contype="0" conaffinity="0" rgba=".35 .4 .5 1"/></default>
+  <default>
+    <geom contype="0" conaffinity="0" group="{ROBOT_GROUP}" rgba=".35 .4 .5 1"/>
+  </default>
   <worldbody>
     <body name="trunk">
       <freejoint/>
+      <light mode="trackcom" directional="true" pos="0 0 3" dir="0 0 -1" diffuse=".3 .3 .3"/>
       <geom type="box" size="{size}" mass="{robot.trunk!r}" rgba=".8 .62 .35 1"/>
       {legs}
     </body>

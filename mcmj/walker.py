@@ -1,18 +1,10 @@
-"""A robot and the body that drives it, in one MuJoCo model; stepped wholly in C.
+"""What drives a robot's legs is a body: both in one MuJoCo model, stepped wholly in C.
 
-The planar body is the model that mcmj.mjcf writes, at another pace and size (mcmj.units), and
-the robot (mcmj.quadruped) is attached to it by MjSpec. Gravity cannot move the body's nodes,
-which slide horizontally. Two kinds of weights join the two models, all in actuators' user data:
-
-    forth  x_i and z_i, readouts of the springs, are the set points of the legs' servos
-    back   u_i = g F_i / (M gravity) is the body's input i     F_i = k (b_i - B_i z_i) + d b_i'
-
-F_i is the force that the servo of leg i bears, linear in springs and in the joint's sensors like
-everything here. Input i pushes the nodes that feedback channel i pushes, as strongly. With
-g = 0 the body does not know of the robot.
+The body walks at another pace and size than it was taught at (mcmj.units). The law that joins
+it to the robot (mcmj.walklaw) is all in actuators' user data; a teacher enters through ctrl.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import mujoco
 import numpy as np
@@ -20,86 +12,24 @@ from mujoco.batch import Batch
 
 from mcmj import laws
 from mcmj.body import Body
-from mcmj.errors import DivergenceError, InvalidArgumentError
+from mcmj.errors import DivergenceError
 from mcmj.gaits import LEGS
 from mcmj.legs import LegReadout
 from mcmj.memory import TAG
-from mcmj.mjcf import DEFAULT_INTEGRATOR, to_mjcf
-from mcmj.quadruped import GRAVITY, Quadruped, quadruped_mjcf
+from mcmj.mjcf import DEFAULT_INTEGRATOR
+from mcmj.quadruped import Quadruped
 from mcmj.quiet import quiet_warnings
+from mcmj.trajectory import State
 from mcmj.units import rescaled, rescaled_readout
 from mcmj.validation import Array, as_array, require_count, require_number
+from mcmj.walklaw import COMMANDS, actuators_of, leg_law
 from mcmj.walkmetrics import Walk
+from mcmj.walkscene import LEG_SENSORS, ROBOT, Terrain, walking_model
 
-ROBOT = "robot/"
-GROUND_GROUP = 2  # of geoms, for renderers that leave the ground out
 SIZE = 1 / 32  # of the body: 100 m become 3 m; changes no bit
 PUSH_DURATION = 0.1  # s
-_LEG_SENSORS = 2 * len(LEGS)  # length and rate of each leg
 _VELOCITY_STAGE = mujoco.mjtStage.mjSTAGE_VEL.value
-
-
-@dataclass(frozen=True)
-class Terrain:
-    """Where the robot walks, and what it carries.
-
-    Attributes:
-        slope: of the ground, uphill positive [rad].
-        load: fixed to the trunk's middle [kg].
-    """
-
-    slope: float = 0.0
-    load: float = 0.0
-
-    def __post_init__(self) -> None:
-        require_number("slope", self.slope, -1.0, 1.0)
-        require_number("load", self.load, 0.0)
-
-
-def walking_model(
-    body: Body, robot: Quadruped, terrain: Terrain, *, timestep: float, integrator: str
-) -> mujoco.MjModel:
-    """One model of a body (w_in of four channels) and a robot beside it.
-
-    Raises:
-        InvalidArgumentError: a body without a channel a leg.
-    """
-    if (body.n_inputs, body.n_outputs) != (len(LEGS), len(LEGS)):
-        raise InvalidArgumentError("body", f"{len(LEGS)} inputs and outputs, one a leg", body)
-    no_readout = np.zeros((body.n_springs + 1, len(LEGS)))
-    text = to_mjcf(body, timestep=timestep, integrator=integrator, w_out=no_readout)
-    spec = mujoco.MjSpec.from_string(text)
-    spec.option.gravity = [0.0, 0.0, -GRAVITY]
-    # contacts of the feet need constraints; a state that blew up is kept for the error message
-    spec.option.disableflags = mujoco.mjtDisableBit.mjDSBL_AUTORESET.value
-    half = terrain.slope / 2
-    tilt = [np.cos(half), 0.0, -np.sin(half), 0.0]
-    _paint_squares(spec, robot.leg)
-    spec.worldbody.add_geom(
-        name="ground", type=mujoco.mjtGeom.mjGEOM_PLANE, size=[0, 0, 1], quat=tilt,
-        contype=0, conaffinity=1, material="squares", group=GROUND_GROUP,
-    )  # fmt: skip
-    beside = body.positions[:, 1].min() - 2 * robot.leg
-    above = robot.standing_height * np.array([-np.sin(terrain.slope), 0.0, np.cos(terrain.slope)])
-    frame = spec.worldbody.add_frame(pos=above + np.array([0.0, beside, 0.0]), quat=tilt)
-    loaded = replace(robot, trunk=robot.trunk + terrain.load)
-    spec.attach(mujoco.MjSpec.from_string(quadruped_mjcf(loaded)), prefix=ROBOT, frame=frame)
-    spec.nuser_actuator = body.n_springs + _LEG_SENSORS + 1
-    return spec.compile()
-
-
-def _paint_squares(spec: mujoco.MjSpec, side: float) -> None:
-    """A ground on which motion shows: squares as long as a leg [m]."""
-    spec.add_texture(
-        name="squares", type=mujoco.mjtTexture.mjTEXTURE_2D,
-        builtin=mujoco.mjtBuiltin.mjBUILTIN_CHECKER,
-        rgb1=[0.97, 0.97, 0.95], rgb2=[0.9, 0.91, 0.89], width=64, height=64,
-    )  # fmt: skip
-    textures = [""] * mujoco.mjtTextureRole.mjNTEXROLE
-    textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = "squares"
-    spec.add_material(
-        name="squares", textures=textures, texrepeat=[1 / side, 1 / side], texuniform=True
-    )
+_CTRL = mujoco.mjtState.mjSTATE_CTRL.value
 
 
 class Walker:
@@ -144,7 +74,7 @@ class Walker:
         self._batch = Batch(self.model, copies, 1)
         self._nodes = 2 * len(self.body.free)  # joints of the body; the trunk's come next
         self._cut = False
-        self._readout = np.zeros((len(LEGS), self.body.n_springs + 1))
+        self._readout = np.zeros((self.body.n_springs + 1, COMMANDS))
         for name in ("sensordata", "qfrc_actuator"):  # copied out by calls after this one only
             self._batch.bind(name)
 
@@ -173,7 +103,10 @@ class Walker:
         if self._cut:  # broken springs measure nothing
             gait = replace(gait, swing=0 * gait.swing, lift=0 * gait.lift)
         self._gait = gait
-        self._batch.expand("actuator_user")[:] = self._weights(gait)
+        names = [self.model.actuator(index).name for index in range(self.model.nu)]
+        self._law = leg_law(names, self.robot, gait.stride, self.coupling)
+        self._readout = np.hstack([self._with_bias(w) for w in (gait.swing, gait.lift)])
+        self._hear(self._readout)
 
     def cut_springs(self) -> None:
         """Cut all springs of the body: they pull no more, and no readout hears from them."""
@@ -193,6 +126,22 @@ class Walker:
     def restore(self, states: Array) -> None:
         """States from snapshots, (copies, n) or (n,) for all; the gait stays what it is."""
         self._batch.state[:] = states
+
+    def stand(self) -> None:
+        """Put the robots back on their feet where they started, at rest; the bodies go on."""
+        start = self.model.qpos0[self._nodes :]
+        self._batch.bind("qpos")[:, self._nodes :] = start
+        self._batch.bind("qvel")[:, self._nodes :] = 0.0
+
+    def body_state(self, copy: int = 0) -> State:
+        """Positions and velocities of a copy's body, in the units it was taught in."""
+        positions, velocities = self.taught.positions.copy(), np.zeros((self.taught.n_nodes, 2))
+        moved, speed = (
+            self._batch.bind(name)[copy, : self._nodes].reshape(-1, 2) for name in ("qpos", "qvel")
+        )
+        positions[self.taught.free] += moved / SIZE
+        velocities[self.taught.free] = speed / (SIZE * self.pace)
+        return State(positions, velocities, time=0.0)
 
     def advance(self, steps: int) -> None:
         """Go on for so many steps, recording nothing."""
@@ -234,48 +183,49 @@ class Walker:
         times = stride * self.timestep * np.arange(1, count + 1, dtype=np.float64)
         return Walk(times, **recorded)
 
+    def led(self, told: object, noise: object) -> Array:
+        """Go on under a teacher, who gives the commands in the readouts' place.
+
+        Args:
+            told: (copies, steps, 8), x_i and z_i of each step.
+            noise: (copies, steps, 4), on the x_i that are fed back, not on the legs'.
+
+        Returns:
+            The springs' lengths (copies, steps, L) at the start of each step, in the units the
+            body was taught in [m].
+
+        Raises:
+            InvalidArgumentError: wrong shapes, or NaN.
+            DivergenceError: a copy blew up.
+        """
+        commands = as_array("told", told, (self.copies, None, COMMANDS))
+        steps, n = commands.shape[1], self.body.n_springs
+        control = commands @ self._law.commands.T
+        control[..., self._feedback] += as_array("noise", noise, (self.copies, steps, len(LEGS)))
+        self._hear(np.zeros_like(self._readout))
+        with quiet_warnings():
+            sensors = self._batch.rollout(steps, control, _CTRL, ["sensordata"])["sensordata"]
+        self._batch.ctrl = 0.0
+        self._hear(self._readout)
+        self._check_alive()
+        return sensors[..., :n] / SIZE
+
     # --- inside ------------------------------------------------------------------------------
 
     def _add_law(self) -> None:
-        """Make inputs and drives of the legs user actuators over springs and leg sensors."""
-        model, robot = self.model, self.robot
-        first = model.sensor("length0").adr[0]
-        gates = {f"in{c}": 1.0 for c in range(len(LEGS))} | {
-            f"fb{c}": 1.0 for c in range(len(LEGS))
-        }
-        for leg in LEGS:
-            gates[f"{ROBOT}{leg}_swing"] = robot.hip_stiffness
-            gates[f"{ROBOT}{leg}_lift"] = robot.leg_stiffness
-        for name, gate in gates.items():
-            actuator = model.actuator(name)
-            actuator.biastype[:] = mujoco.mjtBias.mjBIAS_USER
-            actuator.biasprm[:5] = [gate, TAG, first, self.body.n_springs + _LEG_SENSORS, 0.0]
+        """Make feedback, inputs and drives of the legs user actuators over all sensors needed."""
+        model = self.model
+        first, count = model.sensor("length0").adr[0], self.body.n_springs + LEG_SENSORS
+        for channel, leg in enumerate(LEGS):
+            for name in actuators_of(leg, channel=channel):
+                actuator = model.actuator(name)
+                actuator.biastype[:] = mujoco.mjtBias.mjBIAS_USER
+                actuator.biasprm[:5] = [1.0, TAG, first, count, 0.0]
+        self._feedback = [model.actuator(f"fb{channel}").id for channel in range(len(LEGS))]
 
-    def _weights(self, gait: LegReadout) -> Array:
-        """User data (actuators, L springs + 8 leg sensors + bias) of a gait."""
-        n, robot = self.body.n_springs, self.robot
-        weights = np.zeros((self.model.nu, n + _LEG_SENSORS + 1))
-        position, lift = (self._with_bias(w) for w in (gait.swing, gait.lift))
-        angle = position * gait.stride.of_legs("swing")
-        angle[-1] += gait.stride.of_legs("lean")
-        drawn_in = lift * gait.stride.of_legs("lift")
-        bearing = self.coupling / (robot.mass * GRAVITY)  # of a robot without load
-        springs = np.r_[:n, n + _LEG_SENSORS]
-        for i, leg in enumerate(LEGS):
-            for name, column in (
-                (f"fb{i}", position[:, i]),
-                (f"{ROBOT}{leg}_swing", angle[:, i]),
-                (f"{ROBOT}{leg}_lift", drawn_in[:, i]),
-                (f"in{i}", -bearing * robot.leg_stiffness * drawn_in[:, i]),
-            ):
-                weights[self.model.actuator(name).id, springs] = column
-            length, rate = n + 2 * i, n + 2 * i + 1
-            weights[self.model.actuator(f"in{i}").id, [length, rate]] = (
-                bearing * robot.leg_stiffness,
-                bearing * robot.leg_damping,
-            )
-        self._readout = position.T
-        return weights
+    def _hear(self, readout: Array) -> None:
+        """Command the legs by a readout (L + 1, 8) of the springs."""
+        self._batch.expand("actuator_user")[:] = self._law.weights(readout)
 
     def _with_bias(self, w_out: Array) -> Array:
         """A readout of the faster, smaller body, (L + 1, 4)."""
@@ -286,11 +236,11 @@ class Walker:
     def _sample(self, joints: bool) -> dict[str, Array]:
         batch, n, trunk = self._batch, self.body.n_springs, self._nodes
         qpos, sensors = batch.bind("qpos"), batch.bind("sensordata")
-        lengths = sensors[:, :n]
+        lengths, position = sensors[:, :n], self._readout[:, : len(LEGS)]
         power = batch.bind("qfrc_actuator") * batch.bind("qvel")
         now = {
             "trunk": qpos[:, trunk : trunk + 7].copy(),
-            "outputs": np.einsum("cl,nl->nc", self._readout[:, :n], lengths) + self._readout[:, n],
+            "outputs": np.einsum("lc,nl->nc", position[:n], lengths) + position[n],
             "contact": sensors[:, -len(LEGS) :].copy(),
             "power": np.maximum(power[:, trunk + 6 :], 0.0).sum(axis=1),
         }

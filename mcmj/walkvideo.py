@@ -11,19 +11,23 @@ import mujoco
 import numpy as np
 import numpy.typing as npt
 from PIL import Image, ImageDraw, ImageFont
+from scipy.ndimage import binary_closing
 
 from mcmj.errors import McmjError
 from mcmj.gaits import LEGS
+from mcmj.quadruped import ROBOT_GROUP
 from mcmj.store import whole_file
 from mcmj.validation import Array
-from mcmj.walker import GROUND_GROUP, ROBOT
 from mcmj.walkmetrics import Walk
+from mcmj.walkscene import GROUND_GROUP, ROBOT
 
 Frame = npt.NDArray[np.uint8]
 
 WIDTH, HEIGHT, SIDE = 640, 480, 320  # pixels: the robot's picture; width of the column beside it
 BODY = 230  # height of the body's picture
 FPS = 25
+SHADOW = 1024  # pixels of the map: without shadows feet seem to float
+GAP = 0.05  # s; feet bounce: shorter gaps in a bar of the diagram are closed
 SHOWN = 3.0  # seconds of the gait diagram, the last at its right edge
 LARGEST = 0.08  # largest displacement of a node as drawn, over the size of the picture
 FULL_STRAIN = 0.005  # at which a spring has its full colour
@@ -74,7 +78,8 @@ class GaitDiagram:
 
     def __init__(self, walk: Walk, events: Sequence[Event]) -> None:
         self._times, self._events = walk.times, events
-        self._contact = walk.contact[0] > 0
+        closing = np.ones((max(1, round(GAP / walk.sample)), 1))
+        self._contact = binary_closing(walk.contact[0] > 0, closing)
         self._font = ImageFont.load_default(size=16)
 
     def draw(self, now: float) -> Frame:
@@ -101,8 +106,8 @@ class GaitDiagram:
                     draw.line((at, top - 6, at, top + 4 * row), fill=MARK, width=2)
         draw.text((8, 8), label, fill=MARK, font=ImageFont.load_default(size=22))
         draw.text((SIDE - 74, 12), f"{now:5.1f} s", fill=INK, font=self._font)
-        draw.text((left, height - 24), f"feet on the ground, last {SHOWN:g} s", fill=INK,
-                  font=ImageFont.load_default(size=13))  # fmt: skip
+        caption = f"feet on the ground, last {SHOWN:g} s; bounces left out"
+        draw.text((left, height - 24), caption, fill=INK, font=ImageFont.load_default(size=13))
         return np.asarray(picture)
 
 
@@ -120,19 +125,24 @@ def _pictures(
     springs = model.tendon_stiffness > 0
     rest = model.tendon_lengthspring[springs, 0]
     magnified = LARGEST * model.stat.extent / np.abs(joints[:, :nodes]).max()
-    no_ground = mujoco.MjvOption()
-    no_ground.geomgroup[GROUND_GROUP] = 0
+    only_robot, only_body = mujoco.MjvOption(), mujoco.MjvOption()
+    for groups in (only_robot.geomgroup, only_robot.sitegroup, only_robot.tendongroup):
+        groups[:] = 0
+    only_robot.geomgroup[[ROBOT_GROUP, GROUND_GROUP]] = 1
+    only_body.geomgroup[[ROBOT_GROUP, GROUND_GROUP]] = 0
     for qpos in joints:
         data.qpos[:] = qpos
         mujoco.mj_forward(model, data)
         model.tendon_rgba[springs, :3] = strain_colours(
             data.ten_length[springs] / rest - 1, FULL_STRAIN
         )
-        robot.update_scene(data, camera)
+        model.light_active[:] = True
+        robot.update_scene(data, camera, only_robot)
         picture = robot.render().copy()
         data.qpos[:nodes] *= magnified
         mujoco.mj_forward(model, data)
-        body.update_scene(data, "top", no_ground)
+        model.light_active[:] = False
+        body.update_scene(data, "top", only_body)
         yield picture, body.render().copy()
 
 
@@ -155,6 +165,7 @@ def _camera(model: mujoco.MjModel) -> mujoco.MjvCamera:
 @contextmanager
 def _renderers(model: mujoco.MjModel) -> Iterator[tuple[mujoco.Renderer, mujoco.Renderer]]:
     model.vis.global_.offwidth, model.vis.global_.offheight = WIDTH, HEIGHT
+    model.vis.quality.shadowsize = SHADOW
     try:
         robot = mujoco.Renderer(model, HEIGHT, WIDTH)
     except Exception as error:  # each OpenGL backend raises errors of its own

@@ -16,7 +16,7 @@ from mcmj.experiments.walk import Result, run, tour
 from mcmj.experiments.walk_config import Config, total_steps
 from mcmj.plotting import save
 from mcmj.progress import progress_bar
-from mcmj.walkplot import footfalls, pushes, stride_periods
+from mcmj.walkplot import footfalls, phase_responses, pushes, stride_periods
 
 SHOWN = 4.0  # seconds of footfalls in the figure
 
@@ -45,15 +45,9 @@ def draw(result: Result, out: Path) -> None:
         counts = {name: table["push"][name]["survived"] for name in result.config.gaits}
         save(pushes(counts, result.config.seeds), out / "pushes.png")
     if "adapt" in table:
-        periods = {
-            name: {
-                label: {ground: row["stride_period_s"] or float("nan")
-                        for ground, row in rows.items() if "stride_period_s" in row}
-                for label, rows in by_coupling.items()
-            }
-            for name, by_coupling in table["adapt"].items()
-        }  # fmt: skip
-        save(stride_periods(periods), out / "adapt.png")
+        save(stride_periods(table["adapt"]), out / "adapt.png")
+    if "recover" in table:
+        save(phase_responses(table["recover"], result.config.nudge), out / "recover.png")
 
 
 def film(result: Result, out: Path) -> None:

@@ -71,6 +71,9 @@ CHAINS = (
     (("trunk_walker", "rls"), ("force_learning",)),
     (("force_learning",), ("experiments.trunk",)),
     (("environment_setting", "environment_task"), ("environment",)),
+    (("walkscene",), ("walklaw",)),
+    (("walklaw", "walkmetrics", "legs"), ("walker",)),
+    (("walker",), ("grounding",)),
 )
 MUJOCO = {
     "alteration",
@@ -91,6 +94,7 @@ MUJOCO = {
     "trunk_walker",
     "trunkvideo",
     "walker",
+    "walkscene",
     "walkvideo",
 }
 

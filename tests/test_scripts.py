@@ -254,21 +254,25 @@ def test_perturb_and_swing_up(tmp_path):
 
 @pytest.mark.slow
 def test_walk(tmp_path):
-    """A push that throws the robot over is a fall, and leaves no recovery to be told."""
-    options = ["--parts", "walk", "adapt", "--gaits", "trot", "--settle", "2", "--walking", "3"]
-    options += ["--nudge", "3000", "--no-video", "--out", tmp_path]
-    status, out, err = run("walk", *options)
+    """The ground changes the stride only if coupled; a push that throws it over is a fall."""
+    options = ["--parts", "walk", "adapt", "recover", "--gaits", "trot", "--settle", "2",
+               "--walking", "3", "--before", "2", "--after", "2", "--starts", "1", "--moments", "1",
+               "--slopes", "6", "--loads", "50", "--nudge", "3000"]  # fmt: skip
+    status, out, err = run("walk", *options, "--no-video", "--out", tmp_path)
     assert status == 0, err
     assert "trot" in out
     metrics = metrics_of(tmp_path)["metrics"]
     assert metrics["trot"]["falls"] == 0
     assert metrics["trot"]["speed_m_s"] > 1.0
-    for label in ("uncoupled", "coupled"):
-        push = metrics["adapt"]["trot"][label]["push"]
-        assert push["falls"] == 1
-        assert push["recovery_s"] is None
-        assert push["phase_shift"] is None
-    for figure in ("footfalls.png", "adapt.png"):
+    for label, slower in (("uncoupled", 0.0), ("coupled", 0.009)):
+        rows = metrics["adapt"]["trot"][label]["load"]
+        assert not any(row["falls"] for row in rows.values())
+        periods = [rows[load]["stride_period_s"]["median"] for load in ("0", "50")]
+        assert periods[1] / periods[0] - 1 == pytest.approx(slower, abs=0.003)
+        pushed = metrics["recover"]["trot"][label]["sideways"]
+        assert pushed == {"falls": 1, "deviation": [None], "recovery_s": [None],
+                          "phase_shift": [None]}  # fmt: skip
+    for figure in ("footfalls.png", "adapt.png", "recover.png"):
         assert (tmp_path / figure).stat().st_size > 10_000
 
 

@@ -8,15 +8,26 @@ import pytest
 
 from mcmj.bodyfile import body_of_model, load_model, readouts_of_model
 from mcmj.errors import InvalidArgumentError, UnknownNameError
-from mcmj.experiments.walk_adapt import recovery
 from mcmj.experiments.walk_config import Config
+from mcmj.experiments.walk_recover import distances_from, recovery
 from mcmj.gaits import LEGS, gait_target
+from mcmj.grounding import teach_on_ground
 from mcmj.legs import LegReadout, lift_of, teach_lift
 from mcmj.library import body_path
 from mcmj.quadruped import Quadruped, Stride
 from mcmj.simulation import Simulation
-from mcmj.walker import Terrain, Walker
-from mcmj.walkmetrics import Walk, costs_of_transport, distances, fall_times, phase_shift, turns
+from mcmj.walker import Walker
+from mcmj.walkmetrics import (
+    Walk,
+    costs_of_transport,
+    distances,
+    fall_times,
+    phase_shift,
+    stride_period,
+    turns,
+)
+from mcmj.walkscene import Terrain
+from mcmj.walkvideo import BAR, MARK, Event, GaitDiagram
 
 ROBOT = Quadruped()
 
@@ -77,6 +88,69 @@ def test_the_ground_changes_the_rhythm_only_if_coupled(body, trot):
     }
     assert np.array_equal(runs[0.0, 0.0], runs[0.0, 50.0])
     assert np.abs(runs[-0.4, 0.0] - runs[-0.4, 50.0]).max() > 0.01
+
+
+def test_what_enters_the_body_is_the_load_on_the_servos(body, trot):
+    """u_i = g F_i / (M gravity), F_i minus the force of the leg's two actuators."""
+    walker = started(body, trot, coupling=0.4, terrain=Terrain(load=20.0))
+    forces = walker._batch.bind("actuator_force")
+    walker.advance(8000)
+    force = {walker.model.actuator(i).name: f for i, f in enumerate(forces[0])}
+    heard = [force[f"in{i}"] for i in range(len(LEGS))]
+    borne = [-force[f"robot/{leg}_lift"] - force[f"robot/{leg}_leg_servo"] for leg in LEGS]
+    assert np.abs(borne).max() > 100.0
+    assert heard == pytest.approx(0.4 * np.array(borne) / (9.81 * ROBOT.mass), rel=1e-9, abs=1e-12)
+
+
+def test_a_teacher_leads_body_and_legs(body, trot):
+    """The body as under teacher forcing without a robot; the legs where the teacher says."""
+    walker = started(body, trot)
+    target, steps = gait_target("trot"), 2000
+    positions = target.sample(1e-3 * np.arange(steps))
+    noise = 0.2 * np.random.default_rng(0).standard_normal((steps, len(LEGS)))
+    told = np.hstack([positions, lift_of(positions)])
+    lengths = walker.led(told[None], noise[None])[0]
+    alone = Simulation(body, w_out=trot.swing)
+    alone.set_state(trot.start.positions, trot.start.velocities)
+    wanted = alone.rollout(steps, offset=positions + noise, gate=np.zeros(len(LEGS)))
+    assert np.abs(lengths - wanted.get("lengths")).max() < 1e-11
+    state = walker.body_state()
+    assert np.abs(state.positions - alone.state.positions).max() < 1e-11
+    assert np.abs(state.velocities - alone.state.velocities).max() < 1e-11
+    still = np.tile([0.5, 0.5, -0.5, -0.5, 0.0, 0.0, 0.0, 0.0], (1, 8000, 1))
+    walker.led(still, 0 * still[..., :4])
+    hips = walker.walk(1e-3, sample=1e-3, joints=True).joints[0, -1, -2 * len(LEGS) :: 2]
+    stride = trot.stride
+    wanted = stride.of_legs("swing") * still[0, 0, :4] + stride.of_legs("lean")
+    assert hips == pytest.approx(wanted, abs=0.02)  # the load bends the servos
+
+
+def test_a_body_taught_on_the_ground_keeps_the_targets_pace(body, trot):
+    """Coupled, with the readouts of a body that never bore loads, the stride is off by 3 %."""
+    walker = started(body, trot, coupling=0.4)
+    grounded, fit = teach_on_ground(walker, trot, gait_target("trot"), 0, duration=30.0)
+    assert fit.train_nrmse < 0.02
+    wanted = gait_target("trot").period / walker.pace
+    periods = []
+    for gait in (trot, grounded):
+        walker.start(gait)
+        walk = walker.walk(3.0)
+        assert np.isinf(fall_times(walk, ROBOT.leg)).all()
+        periods.append(stride_period(walk.after(1.5), wanted))
+    assert abs(periods[0] / wanted - 1) > 0.01
+    assert periods[1] == pytest.approx(wanted, rel=0.003)
+
+
+def test_robots_put_back_on_their_feet(body, trot):
+    walker = started(body, trot)
+    first = walker.snapshot()
+    walker.walk(0.5)
+    before = walker.body_state()
+    walker.stand()
+    assert np.array_equal(walker.body_state().positions, before.positions)
+    assert np.array_equal(walker.body_state().velocities, before.velocities)
+    robot = np.arange(walker._nodes, walker.model.nq) + 1  # the state begins with the time
+    assert np.array_equal(walker.snapshot()[0, robot], first[0, robot])
 
 
 def test_copies_and_repeats_give_the_same_bits(body, trot):
@@ -148,7 +222,24 @@ def test_phase_shift_and_recovery_of_made_up_rhythms():
     assert phase_shift(walk, 1.0, 1) == pytest.approx(0.1, abs=1e-6)
     circle = np.column_stack([np.cos(2 * np.pi * times), np.sin(2 * np.pi * times)])
     kicked = circle * (1 + 0.5 * np.exp(-times))[:, None]
-    assert recovery(kicked, circle, 0.01) == pytest.approx(np.log(5.0), abs=0.02)
+    away = distances_from(circle, kicked)
+    assert away[0] == pytest.approx(0.5, abs=0.01)
+    assert recovery(away, 0.01) == pytest.approx(np.log(0.5 / 0.03), abs=0.02)
+
+
+def test_the_diagram_of_a_film_closes_bounces_and_marks_switches():
+    contact = np.zeros((1, 300, 4))
+    contact[0, :, 0] = 1.0
+    contact[0, 100:102, 0] = 0.0  # a bounce
+    contact[0, 150:, 1] = 1.0
+    walk = made_up(poses(300), contact=contact)
+    picture = GaitDiagram(walk, [Event(0.0, "walk"), Event(2.0, "trot")]).draw(3.0).astype(int)
+    blue = (np.abs(picture - BAR).sum(axis=-1) < 10).sum(axis=1)  # pixels in a line
+    lines = blue[blue > 0].reshape(2, -1)  # two legs that stand, each bar as high
+    assert np.ptp(lines, axis=1).max() == 0
+    assert lines[0, 0] == pytest.approx(2 * lines[1, 0], rel=0.02)
+    marked = (np.abs(picture - MARK).sum(axis=-1) < 10).sum(axis=0)
+    assert marked.argmax() == pytest.approx(40 + (320 - 48) * 2 / 3, abs=2)
 
 
 def test_a_leg_is_lifted_when_its_output_rises():
@@ -163,6 +254,10 @@ def test_errors_name_the_argument(body):
         Config(gaits=("gallop",))
     with pytest.raises(UnknownNameError, match="unknown part 'swim'"):
         Config(parts=("swim",))
+    with pytest.raises(InvalidArgumentError, match="coupling: expected a number other than 0"):
+        Config(coupling=0.0)
+    with pytest.raises(InvalidArgumentError, match="after: expected"):
+        Config(after=1.0)
     with pytest.raises(InvalidArgumentError, match="leg: expected"):
         Quadruped(leg=-1.0)
     with pytest.raises(InvalidArgumentError, match="body: expected 4 inputs and outputs"):

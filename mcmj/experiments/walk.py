@@ -12,7 +12,8 @@ import numpy as np
 from mcmj import walkmetrics
 from mcmj.experiments.walk_adapt import adapt
 from mcmj.experiments.walk_config import Config
-from mcmj.experiments.walk_lesson import Lesson, Table, learn, moments, walk_table
+from mcmj.experiments.walk_lesson import Lesson, Table, learn, states_at, walk_table
+from mcmj.experiments.walk_recover import recover
 from mcmj.progress import OnSteps
 from mcmj.simulation import Simulation
 from mcmj.streams import stream
@@ -41,20 +42,22 @@ def run(config: Config, *, on_steps: OnSteps = lambda steps: None) -> Result:
     """
     lesson = learn(config)
     walks: dict[str, Walk] = {}
-    table: Table = {"lift_nrmse": lesson.lift_nrmse}
+    table: Table = {**lesson.fits}
     if "walk" in config.parts:
         walks = _each(config.gaits, partial(walk_gait, lesson), on_steps)
         table |= {name: walk_table(lesson, name, walk) for name, walk in walks.items()}
     if "switch" in config.parts:
         falls = _each(config.pairs, partial(switch, lesson), on_steps)
         table["switch"] = {
-            f"{first}_to_{second}": {"falls": count, "of": config.moments}
-            for (first, second), count in falls.items()
+            f"{first}_to_{second}": {"falls": len(at), "of": config.moments, "falls_at": at}
+            for (first, second), at in falls.items()
         }
     if "push" in config.parts:
         table["push"] = push_table(config, _each(config.gaits, partial(push, lesson), on_steps))
     if "adapt" in config.parts:
         table["adapt"] = _each(config.gaits, partial(adapt, lesson), on_steps)
+    if "recover" in config.parts:
+        table["recover"] = _each(config.gaits, partial(recover, lesson), on_steps)
     if "steps" in config.parts:
         table["steps"] = _each(config.gaits, partial(step_study, lesson), on_steps)
     if "cost" in config.parts:
@@ -90,28 +93,32 @@ def tour(lesson: Lesson) -> tuple[Walker, Walk, list[tuple[float, str]]]:
     return walker, walkmetrics.joined(parts), events
 
 
-def switch(lesson: Lesson, pair: tuple[str, str], on_steps: OnSteps = lambda steps: None) -> int:
-    """Falls among switches from one gait to another at several moments of the stride."""
+def switch(
+    lesson: Lesson, pair: tuple[str, str], on_steps: OnSteps = lambda steps: None
+) -> list[float]:
+    """At which moments of the stride, in strides, a switch from one gait to another ends in a fall.
+
+    Moments are counted from the one that is `before` seconds after the start.
+    """
     config, (first, second) = lesson.config, pair
+    moments = np.arange(config.moments) / config.moments
     walker = lesson.walker(copies=config.moments)
-    rng = stream(config.seed, "walk_moments")
     walker.start(lesson.gaits[first])
-    walker.restore(moments(lesson, first, config.moments, rng))
+    walker.restore(states_at(lesson, lesson.gaits[first], moments * lesson.period(first)))
     walker.set_gait(lesson.gaits[second])
     walk = walker.walk(config.after, sample=0.02)
     on_steps(round((config.before + config.moments * config.after) / walker.timestep))
-    return int(np.isfinite(walkmetrics.fall_times(walk, config.robot.leg)).sum())
+    return moments[np.isfinite(walkmetrics.fall_times(walk, config.robot.leg))].tolist()
 
 
-def push(
-    lesson: Lesson, name: str, on_steps: OnSteps = lambda steps: None, *, coupling: float = 0.0
-) -> dict[float, int]:
+def push(lesson: Lesson, name: str, on_steps: OnSteps = lambda steps: None) -> dict[float, int]:
     """How many of `seeds` pushes of each size a gait survives, at random moments and directions."""
-    config = lesson.config
-    walker = lesson.walker(copies=config.seeds, coupling=coupling)
-    walker.start(lesson.gaits[name])
-    states = moments(lesson, name, config.seeds, stream(config.seed, "walk_moments"))
+    config, gait = lesson.config, lesson.gaits[name]
+    waits = stream(config.seed, "walk_moments").uniform(0.0, 2.0, config.seeds)
     angle = stream(config.seed, "walk_pushes").uniform(0.0, 2 * np.pi, config.seeds)
+    states = states_at(lesson, gait, np.sort(waits) * lesson.period(name))
+    walker = lesson.walker(copies=config.seeds)
+    walker.start(gait)
     survived = {}
     for impulse in sorted(config.impulses):
         walker.restore(states)

@@ -1,81 +1,89 @@
-"""The ground as part of the computer: does the rhythm adapt if the legs' loads enter the body?"""
+"""The ground as part of the computer: does the rhythm adapt to it if the legs' loads enter?
+
+Every ground is walked on from several moments of the stride, by the body that does not feel it
+(no coupling) and by the one that was taught with it (mcmj.grounding).
+"""
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from mcmj import walkmetrics
-from mcmj.experiments.walk_lesson import Lesson, Table, walk_table
-from mcmj.metrics import rms_radius
+from mcmj.experiments.walk_lesson import Lesson, Table, states_at
+from mcmj.gaits import LEGS
 from mcmj.progress import OnSteps
+from mcmj.quadruped import GRAVITY
 from mcmj.validation import Array
-from mcmj.walker import Terrain
-
-TOLERANCE = 0.1  # distance from the orbit, over its RMS radius, at which a rhythm is back
+from mcmj.walker import Walker
+from mcmj.walkmetrics import Walk
+from mcmj.walkscene import Terrain
 
 
 def adapt(lesson: Lesson, name: str, on_steps: OnSteps = lambda steps: None) -> Table:
-    """One gait on every ground and after a push, without coupling and with it."""
-    config = lesson.config
-    slope = np.radians(config.slope)
-    terrains = {
-        "flat": Terrain(),
-        "uphill": Terrain(slope=slope),
-        "downhill": Terrain(slope=-slope),
-        "load": Terrain(load=config.load),
-    }
-    table: Table = {}
-    for label, coupling in (("uncoupled", 0.0), ("coupled", config.coupling)):
-        rows: Table = {}
-        for place, terrain in terrains.items():
-            rows[place] = _on(lesson, name, terrain, coupling)
-        rows["push"] = nudged(lesson, name, coupling)
-        table[label] = rows
-        duration = config.settle + config.walking
-        on_steps(round((len(terrains) + 1) * duration * config.pace / config.timestep))
-    return table
-
-
-def _on(lesson: Lesson, name: str, terrain: Terrain, coupling: float) -> Table:
-    config = lesson.config
-    walker = lesson.walker(terrain=terrain, coupling=coupling)
-    walker.start(lesson.gaits[name])
-    walk = walker.walk(config.settle + config.walking)
-    row = walk_table(lesson, name, walk, slope=terrain.slope, mass=walker.mass)
-    period = row["stride_period_s"]
-    assert isinstance(period, float)
-    steady = np.isfinite(period)
-    lags = walkmetrics.ground_lags(walk.after(config.settle), period) if steady else np.nan
-    return row | {"ground_lags": lags}
-
-
-def nudged(lesson: Lesson, name: str, coupling: float) -> Table:
-    """What a push sideways does to the rhythm, beside the same walk without it.
-
-    recovery_s is when outputs are within 10 % of the other's orbit for good (0: they were never
-    further), phase_shift by how much, in periods, the pushed one is then ahead; neither is known
-    (NaN) if one of the two falls.
-    """
-    config = lesson.config
-    walker = lesson.walker(coupling=coupling, copies=2)
-    walker.start(lesson.gaits[name])
-    walker.advance(round(config.settle / walker.timestep))
-    walk = walker.walk(config.walking, push=[[0.0, 0.0], [0.0, config.nudge]])
-    fallen = np.isfinite(walkmetrics.fall_times(walk, config.robot.leg))
-    upright = not fallen.any()
-    period = walkmetrics.stride_period(walk.after(config.walking / 2), lesson.period(name))
-    steady = upright and np.isfinite(period)
+    """One gait on slopes [degrees] and with loads [kg], without coupling and with it."""
     return {
-        "falls": int(fallen[1]),
-        "recovery_s": (
-            recovery(walk.outputs[1], walk.outputs[0], walk.sample) if upright else np.nan
-        ),
-        "phase_shift": walkmetrics.phase_shift(walk, period, 1) if steady else np.nan,
+        label: _response(lesson, name, coupling, on_steps)
+        for label, coupling in lesson.couplings.items()
     }
 
 
-def recovery(outputs: Array, reference: Array, sample: float) -> float:
-    """Time [s] from which outputs (T, n) stay near an orbit through samples (M, n)."""
-    away = cKDTree(reference).query(outputs)[0] / rms_radius(reference)
-    outside = np.flatnonzero(away > TOLERANCE)
-    last = int(outside[-1]) + 1 if outside.size else 0
-    return np.inf if last == len(outputs) else last * sample
+def _response(lesson: Lesson, name: str, coupling: float, on_steps: OnSteps) -> Table:
+    config, gait = lesson.config, lesson.gait(name, coupling)
+    waits = lesson.period(name) * np.arange(config.starts) / config.starts
+    states = states_at(lesson, gait, waits, coupling)
+
+    def on(terrain: Terrain) -> Table:
+        walker = lesson.walker(terrain=terrain, coupling=coupling, copies=config.starts)
+        walker.start(gait)
+        walker.restore(states)
+        walker.stand()
+        walk = walker.walk(config.before + config.after)
+        on_steps(config.starts * round(walk.times[-1] / walker.timestep))
+        return _row(lesson, name, walker, walk, terrain.slope)
+
+    level = on(Terrain())
+    slopes = {f"{slope:g}": on(Terrain(slope=np.radians(slope))) for slope in config.slopes}
+    loads = {f"{load:g}": on(Terrain(load=load)) for load in config.loads}
+    return {"slope": _sorted(slopes | {"0": level}), "load": _sorted(loads | {"0": level})}
+
+
+def _row(lesson: Lesson, name: str, walker: Walker, walk: Walk, slope: float) -> Table:
+    """Falls, and the spread over the copies that did not.
+
+    ground_lag is that of the feet's load behind the outputs, mean of all legs [strides].
+    """
+    falls = np.isfinite(walkmetrics.fall_times(walk, lesson.config.robot.leg, slope))
+    upright = np.flatnonzero(~falls).tolist()
+    settled = walk.after(lesson.config.before)
+    guess = lesson.period(name)
+    periods = [walkmetrics.stride_period(settled, guess, copy) for copy in upright]
+    lags = [
+        walkmetrics.ground_lags(settled, period, copy)
+        for copy, period in zip(upright, periods, strict=True)
+        if np.isfinite(period)
+    ]
+    costs = walkmetrics.costs_of_transport(settled, GRAVITY * walker.mass)
+    return {
+        "falls": int(falls.sum()),
+        "of": len(falls),
+        "stride_period_s": spread(np.array(periods)),
+        "ground_lag": spread(_about(lags).mean(axis=1)),
+        "speed_m_s": spread(walkmetrics.speeds(settled)[upright]),
+        "cost_of_transport": spread(costs[upright]),
+    }
+
+
+def spread(values: Array) -> Table:
+    """Median and range of values (n,), without what is not finite; NaN if nothing is."""
+    kept = values[np.isfinite(values)]
+    if len(kept) == 0:
+        return dict.fromkeys(("median", "low", "high"), np.nan)
+    return {"median": np.median(kept), "low": kept.min(), "high": kept.max()}
+
+
+def _about(lags: list[Array]) -> Array:
+    """Lags (copies, n_legs) on a circle as numbers within half a turn of the first's."""
+    turns = np.array(lags).reshape(-1, len(LEGS))
+    return turns[:1] + np.mod(turns - turns[:1] + 0.5, 1.0) - 0.5
+
+
+def _sorted(rows: dict[str, Table]) -> dict[str, Table]:
+    return dict(sorted(rows.items(), key=lambda item: float(item[0])))

@@ -12,7 +12,8 @@ from mcmj.quadruped import Quadruped
 from mcmj.validation import Array, require_count, require_names, require_number
 from mcmj.walker import PUSH_DURATION
 
-PARTS = ("walk", "switch", "push", "adapt", "steps", "cost")
+PARTS = ("walk", "switch", "push", "adapt", "recover", "steps", "cost")
+SHORTEST = 15.5  # s of the body as it was taught in which a stride is measured: three of a walk
 
 
 @dataclass(frozen=True)
@@ -23,23 +24,26 @@ class Config:
         gaits: which; the first is the one whose push and switch the video shows.
         body: a body file with readouts of these gaits, or the name of a body of mcmj's.
         parts: of the experiment: walk in every gait; switch between them while walking; push
-            and count falls; adapt to slope, load and pushes, with and without coupling;
-            steps: the same walk at other time steps; cost of a step beside the planar scene.
-        seed: of the pushes' directions and moments.
+            and count falls; adapt to slope and load, and recover from pushes at every moment of
+            the stride, both with and without coupling; steps: the same walk at other time
+            steps; cost of a step beside the planar scene.
+        seed: of the pushes' directions and moments, and of the teaching's noise.
         pace: of the body, as many times faster than it was taught.
         timestep: of the body as it was taught [s]; the scene's is that over the pace.
-        settle: walking that is not measured [s].
+        settle: walking that is not measured [s]; a pace needs 10.
         walking: walking that is [s].
-        before, after: a switch comes after this time, and has that to be survived [s].
-        moments: of the stride at which a switch is made.
+        before, after: what switch, adapt and recover watch comes after this time, and lasts so
+            long [s].
+        moments: of the stride at which a switch, or a push of recover, is made.
         seeds: number of pushes of each size in each gait.
         impulses: sizes of the pushes [N s], in all horizontal directions, for 0.1 s.
         survive: a push is survived if the robot does not fall for so long [s].
         coupling: g, of the legs' load into the body where the ground is part of the computer.
-        slope: of the ground for adapt [degrees], uphill and down.
-        load: on the trunk for adapt [kg].
-        nudge: push sideways for adapt [N s].
-        steps_ms: time steps for steps, of the body as it was taught [ms].
+        slopes: of the ground for adapt, beside level ground [degrees], uphill positive.
+        loads: on the trunk for adapt, beside none [kg].
+        starts: moments of the stride at which adapt puts the robot on each ground.
+        nudge: pushes of recover [N s].
+        steps_ms: time steps for steps, beside timestep, of the body as it was taught [ms].
         robot: its sizes and servos.
     """
 
@@ -49,19 +53,20 @@ class Config:
     seed: int = 0
     pace: float = 8.0
     timestep: float = 1e-3
-    settle: float = 3.0
+    settle: float = 10.0
     walking: float = 10.0
     before: float = 3.0
     after: float = 6.0
     moments: int = 4
     seeds: int = 20
-    impulses: tuple[float, ...] = (50.0, 100.0, 150.0, 200.0)
+    impulses: tuple[float, ...] = (100.0, 150.0, 200.0)
     survive: float = 3.0
-    coupling: float = -0.4
-    slope: float = 6.0
-    load: float = 50.0
-    nudge: float = 60.0
-    steps_ms: tuple[float, ...] = (0.5, 1.0, 2.0)
+    coupling: float = 0.4
+    slopes: tuple[float, ...] = (-6.0, -3.0, 3.0, 6.0)
+    loads: tuple[float, ...] = (25.0, 50.0)
+    starts: int = 2
+    nudge: float = 150.0
+    steps_ms: tuple[float, ...] = (0.5, 2.0)
     robot: Quadruped = field(default_factory=Quadruped)
 
     def __post_init__(self) -> None:
@@ -70,16 +75,23 @@ class Config:
         require_count("seed", self.seed, 0)
         require_count("seeds", self.seeds, 1)
         require_count("moments", self.moments, 1)
+        require_count("starts", self.starts, 1)
         for name in ("pace", "timestep", "walking", "before", "after", "survive"):
             require_number(name, getattr(self, name), 0.0, open_low=True)
         require_number("survive", self.survive, 2 * PUSH_DURATION)
-        for name in ("settle", "load", "nudge"):
+        if {"adapt", "recover"} & set(self.parts):
+            require_number("after", self.after, SHORTEST / self.pace)
+        for name in ("settle", "nudge"):
             require_number(name, getattr(self, name), 0.0)
         require_number("coupling", self.coupling, -10.0, 10.0)
-        require_number("slope", self.slope, 0.0, 45.0)
+        if self.coupling == 0.0:
+            raise InvalidArgumentError("coupling", "a number other than 0", self.coupling)
+        for slope in self.slopes:
+            require_number("slopes", slope, -45.0, 45.0)
         for name in ("impulses", "steps_ms"):
             if not getattr(self, name):
                 raise InvalidArgumentError(name, "at least one", ())
+        for name in ("impulses", "steps_ms", "loads"):
             for value in getattr(self, name):
                 require_number(name, value, 0.0, open_low=True)
 
@@ -108,11 +120,13 @@ def get_body(config: Config) -> tuple[Body, dict[str, Array]]:
 def total_steps(config: Config) -> int:
     """Steps of all parts, for a progress bar."""
     whole, count = config.settle + config.walking, len(config.gaits)
+    grounds = 1 + len(config.slopes) + len(config.loads)
     seconds = {
         "walk": count * whole,
         "switch": len(config.pairs) * (config.before + config.moments * config.after),
         "push": count * len(config.impulses) * config.seeds * config.survive,
-        "adapt": count * 2 * 5 * whole,
+        "adapt": count * 2 * grounds * config.starts * (config.before + config.after),
+        "recover": count * 2 * 3 * config.moments * config.after,
         "steps": count * sum(whole / (step * 1e-3 / config.timestep) for step in config.steps_ms),
         "cost": 0.0,
     }

@@ -1,6 +1,7 @@
 """What all parts of the walking experiment share: the taught body, robots, the table of a walk."""
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -8,9 +9,11 @@ from mcmj import walkmetrics
 from mcmj.body import Body
 from mcmj.experiments.walk_config import Config, get_body
 from mcmj.gaits import gait_target
+from mcmj.grounding import teach_on_ground
 from mcmj.legs import LegReadout, teach_lift
 from mcmj.progress import OnSteps
 from mcmj.quadruped import GRAVITY, STRIDES
+from mcmj.readout import Fit
 from mcmj.threads import in_threads
 from mcmj.validation import Array
 from mcmj.walker import Walker
@@ -21,12 +24,19 @@ Table = dict[str, object]
 
 @dataclass(frozen=True)
 class Lesson:
-    """What all parts of the experiment start from: the body and its gaits."""
+    """What all parts of the experiment start from: the body and its gaits.
+
+    Attributes:
+        gaits: taught without ground.
+        grounded: taught with the legs' loads in the body, if a part needs them.
+        fits: errors of both on what they were fitted to, for metrics.json.
+    """
 
     config: Config
     body: Body
     gaits: dict[str, LegReadout]
-    lift_nrmse: dict[str, float]
+    grounded: dict[str, LegReadout] = field(default_factory=dict)
+    fits: Table = field(default_factory=dict)
 
     def walker(self, **options: object) -> Walker:
         """A new robot with the config's settings."""
@@ -38,31 +48,54 @@ class Lesson:
         """Of a gait at the robot's pace [s]."""
         return gait_target(gait).period / self.config.pace
 
+    @property
+    def couplings(self) -> dict[str, float]:
+        """Without and with the legs' loads in the body."""
+        return {"uncoupled": 0.0, "coupled": self.config.coupling}
+
+    def gait(self, name: str, coupling: float) -> LegReadout:
+        """The readouts for a body with that coupling."""
+        return self.grounded[name] if coupling else self.gaits[name]
+
 
 def learn(config: Config) -> Lesson:
-    """Take the config's body and gaits, and teach it how far the legs are lifted."""
+    """Take the config's body and gaits, teach it how far the legs are lifted, and the ground."""
     body, readouts = get_body(config)
 
-    def teach(name: str, on_steps: OnSteps) -> tuple[LegReadout, float]:
-        gait, fit = teach_lift(
-            body, readouts[name], gait_target(name), stride=STRIDES.get(name), engine="twin"
-        )
-        return gait, fit.train_nrmse
+    def lift(name: str, on_steps: OnSteps) -> tuple[LegReadout, Fit]:
+        stride = STRIDES.get(name)
+        return teach_lift(body, readouts[name], gait_target(name), stride=stride, engine="twin")
 
-    taught = in_threads(teach, config.gaits, lambda steps: None)
-    gaits = {name: gait for name, (gait, _) in zip(config.gaits, taught, strict=True)}
-    nrmse = {name: error for name, (_, error) in zip(config.gaits, taught, strict=True)}
-    return Lesson(config, body, gaits, nrmse)
+    gaits, lifts = _taught(config, lift)
+    lesson = Lesson(config, body, gaits, fits={"lift_nrmse": lifts})
+    if not {"adapt", "recover"} & set(config.parts):
+        return lesson
+
+    def ground(name: str, on_steps: OnSteps) -> tuple[LegReadout, Fit]:
+        walker = lesson.walker(coupling=config.coupling)
+        return teach_on_ground(walker, gaits[name], gait_target(name), config.seed)
+
+    grounded, errors = _taught(config, ground)
+    return replace(lesson, grounded=grounded, fits=lesson.fits | {"ground_nrmse": errors})
 
 
-def walk_table(
-    lesson: Lesson, name: str, walk: Walk, *, slope: float = 0.0, mass: float | None = None
-) -> Table:
+def _taught(
+    config: Config, teach: Callable[[str, OnSteps], tuple[LegReadout, Fit]]
+) -> tuple[dict[str, LegReadout], dict[str, float]]:
+    """Readouts and their errors by gait."""
+    results = dict(
+        zip(config.gaits, in_threads(teach, config.gaits, lambda steps: None), strict=True)
+    )
+    gaits = {name: gait for name, (gait, _) in results.items()}
+    return gaits, {name: fit.train_nrmse for name, (_, fit) in results.items()}
+
+
+def walk_table(lesson: Lesson, name: str, walk: Walk) -> Table:
     """How a walk (its first copy) went after the first `settle` seconds."""
     config = lesson.config
-    fallen = np.isfinite(walkmetrics.fall_times(walk, config.robot.leg, slope)[0])
+    fallen = np.isfinite(walkmetrics.fall_times(walk, config.robot.leg)[0])
     settled = walk.after(config.settle)
-    weight = GRAVITY * (config.robot.mass if mass is None else mass)
+    weight = GRAVITY * config.robot.mass
     measured = {
         "distance_m": walkmetrics.distances(settled)[0],
         "speed_m_s": walkmetrics.speeds(settled)[0],
@@ -76,15 +109,14 @@ def walk_table(
     return {"falls": int(fallen), **measured, "stride_period_s": period}
 
 
-def moments(lesson: Lesson, name: str, count: int, rng: np.random.Generator) -> Array:
-    """States (count, n) at random moments of two strides of a settled walk."""
-    walker = lesson.walker()
-    walker.start(lesson.gaits[name])
-    waits = np.sort(rng.uniform(0.0, 2 * lesson.period(name), count))
-    states, previous = [], -lesson.config.before
+def states_at(lesson: Lesson, gait: LegReadout, waits: Array, coupling: float = 0.0) -> Array:
+    """States (len(waits), n) of a robot after `before` seconds and ascending waits [s] more."""
+    walker = lesson.walker(coupling=coupling)
+    walker.start(gait)
+    states, done = [], 0
     for wait in waits:
-        steps = max(1, round((wait - previous) / walker.timestep))
-        walker.advance(steps)
+        until = round((lesson.config.before + wait) / walker.timestep)
+        walker.advance(until - done)
+        done = until
         states.append(walker.snapshot()[0])
-        previous = wait
     return np.array(states)
