@@ -278,9 +278,9 @@ def test_walk(tmp_path):
 
 def test_trunk(tmp_path):
     """Figure, readouts and metrics; seconds of learning are too few to ask for more than that."""
-    options = ["--gaits", "bound", "--parts", "rest", "--seeds", "2", "--no-video", "--walking", "3",
-               "--judged", "1", "--rounds", "1", "--round-duration", "4",
-               "--trial", "2", "--out", tmp_path]  # fmt: skip
+    options = ["--gaits", "bound", "--parts", "rest", "--seeds", "2", "--no-video"]
+    options += ["--walking", "3", "--judged", "1", "--rounds", "1", "--round-duration", "4"]
+    options += ["--trial", "2", "--out", tmp_path]
     status, out, err = run("trunk", *options)
     assert status == 0, err
     assert "bound" in out

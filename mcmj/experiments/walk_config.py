@@ -13,6 +13,7 @@ from mcmj.validation import Array, require_count, require_names, require_number
 from mcmj.walker import PUSH_DURATION
 
 PARTS = ("walk", "switch", "push", "adapt", "recover", "steps", "cost")
+USUAL_PARTS = ("walk", "switch", "push", "cost")  # the others take ten minutes more
 SHORTEST = 15.5  # s of the body as it was taught in which a stride is measured: three of a walk
 
 
@@ -49,7 +50,7 @@ class Config:
 
     gaits: tuple[str, ...] = tuple(GAITS)
     body: str = "gaits"
-    parts: tuple[str, ...] = PARTS
+    parts: tuple[str, ...] = USUAL_PARTS
     seed: int = 0
     pace: float = 8.0
     timestep: float = 1e-3

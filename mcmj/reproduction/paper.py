@@ -15,8 +15,7 @@ RETURNS = "returns to its orbit; no times are given"
 
 def _of_tasks(text: str, run: str, paths: str, paper: str = LEARNED) -> tuple[Claim, ...]:
     return tuple(
-        Claim(text.format(NAMES[name]), paper, run, (paths.format(name),))
-        for name in TARGETS
+        Claim(text.format(NAMES[name]), paper, run, (paths.format(name),)) for name in TARGETS
     )
 
 
