@@ -104,14 +104,14 @@ def draw_body(seed: int, settings: BodySettings) -> Body:
     fixed[[positions[:, 0].argmin(), positions[:, 0].argmax()]] = True
     free = np.flatnonzero(~fixed)
     parameters = {
-        name: _log_uniform(stream(seed, name), getattr(settings, name), len(springs))
+        name: log_uniform(stream(seed, name), getattr(settings, name), len(springs))
         for name in ("k1", "k3", "d1", "d3")
     }
     return Body(
         positions=positions,
         springs=springs,
         fixed=fixed,
-        masses=_log_uniform(stream(seed, "masses"), settings.masses, n),
+        masses=log_uniform(stream(seed, "masses"), settings.masses, n),
         w_in=_channel_weights(
             stream(seed, "input_weights"),
             (n, settings.n_inputs),
@@ -149,7 +149,8 @@ def delaunay_springs(positions: npt.ArrayLike) -> npt.NDArray[np.int64]:
     return np.unique(np.sort(edges, axis=1), axis=0).astype(np.int64)
 
 
-def _log_uniform(rng: np.random.Generator, bounds: Range, size: int) -> Array:
+def log_uniform(rng: np.random.Generator, bounds: Range, size: int) -> Array:
+    """Numbers (size,) whose logarithms are uniform between those of the bounds."""
     low, high = bounds
     if low == high:
         return np.full(size, float(low))

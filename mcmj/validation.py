@@ -1,11 +1,11 @@
 """Checks at the boundary: arrays and numbers as the rest of the package expects them."""
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
 import numpy as np
 import numpy.typing as npt
 
-from mcmj.errors import InvalidArgumentError
+from mcmj.errors import InvalidArgumentError, UnknownNameError
 
 Array = npt.NDArray[np.float64]
 
@@ -73,3 +73,16 @@ def require_count(name: str, value: int, low: int) -> None:
     """Raise unless value is an integer >= low."""
     if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < low:
         raise InvalidArgumentError(name, f"an integer >= {low}", repr(value))
+
+
+def require_names(kind: str, given: Sequence[str], known: Collection[str]) -> None:
+    """Check that names are known ones, at least one, each once.
+
+    Raises:
+        InvalidArgumentError, UnknownNameError: they are not.
+    """
+    for name in given:
+        if name not in known:
+            raise UnknownNameError(kind, name, known)
+    if not given or len(set(given)) < len(given):
+        raise InvalidArgumentError(f"{kind}s", "at least one, each once", given)

@@ -30,6 +30,7 @@ SHADOW = 1024  # pixels of the map: without shadows feet seem to float
 GAP = 0.05  # s; feet bounce: shorter gaps in a bar of the diagram are closed
 SHOWN = 3.0  # seconds of the gait diagram, the last at its right edge
 LARGEST = 0.08  # largest displacement of a node as drawn, over the size of the picture
+FULL_STRAIN = 0.005  # at which a spring has its full colour
 INK, BAR, MARK = (30, 30, 30), (40, 60, 110), (224, 123, 0)
 STRETCHED, SHORTENED, SLACK = (0.84, 0.15, 0.16), (0.12, 0.31, 0.84), (0.55, 0.58, 0.62)
 
@@ -132,7 +133,9 @@ def _pictures(
     for qpos in joints:
         data.qpos[:] = qpos
         mujoco.mj_forward(model, data)
-        model.tendon_rgba[springs, :3] = _strain_colours(data.ten_length[springs] / rest - 1)
+        model.tendon_rgba[springs, :3] = strain_colours(
+            data.ten_length[springs] / rest - 1, FULL_STRAIN
+        )
         model.light_active[:] = True
         robot.update_scene(data, camera, only_robot)
         picture = robot.render().copy()
@@ -143,9 +146,9 @@ def _pictures(
         yield picture, body.render().copy()
 
 
-def _strain_colours(strain: Array) -> Array:
-    """Blue when shortened, red when stretched, full at a strain of 0.5 %."""
-    weight = np.minimum(np.abs(strain) / 0.005, 1.0)[:, None]
+def strain_colours(strain: Array, full: float) -> Array:
+    """Colours (n, 3): blue when shortened, red when stretched, full at the strain `full`."""
+    weight = np.minimum(np.abs(strain) / full, 1.0)[:, None]
     goal = np.where(strain[:, None] > 0, STRETCHED, SHORTENED)
     return (1 - weight) * np.array(SLACK) + weight * goal
 

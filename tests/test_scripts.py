@@ -276,6 +276,23 @@ def test_walk(tmp_path):
         assert (tmp_path / figure).stat().st_size > 10_000
 
 
+def test_trunk(tmp_path):
+    """Figure, readouts and metrics; seconds of learning are too few to ask for more than that."""
+    options = ["--gaits", "bound", "--parts", "rest", "--seeds", "2", "--no-video"]
+    options += ["--walking", "3", "--judged", "1", "--rounds", "1", "--round-duration", "4"]
+    options += ["--trial", "2", "--out", tmp_path]
+    status, out, err = run("trunk", *options)
+    assert status == 0, err
+    assert "bound" in out
+    metrics = metrics_of(tmp_path)["metrics"]
+    assert set(metrics) == {"bound", "seeds", "rest"}
+    assert metrics["seeds"]["bound"]["upright"]["of"] == 2
+    assert metrics["bound"]["taught_period_s"] == pytest.approx(0.3416, abs=1e-4)
+    assert (tmp_path / "trunk.png").stat().st_size > 10_000
+    with np.load(tmp_path / "readouts.npz") as arrays:
+        assert arrays["bound/w_out"].shape[1] == 8
+
+
 @pytest.mark.slow
 def test_certify(tmp_path):
     options = ["--task", "quadratic", "--body", "quadratic", "--free-run", "25", "--recovery", "25",

@@ -4,14 +4,18 @@ from mcmj.gaits import GAITS
 from mcmj.reproduction.claims import Claim, Part, Run
 from mcmj.targets import TARGETS
 
+NAMES = {
+    "van_der_pol": "Van der Pol",
+    "quadratic": "the quadratic limit cycle",
+    "lissajous": "Lissajous 3:2",
+}
 LEARNED = "drawn on the target; no error is given"
 RETURNS = "returns to its orbit; no times are given"
 
 
 def _of_tasks(text: str, run: str, paths: str, paper: str = LEARNED) -> tuple[Claim, ...]:
     return tuple(
-        Claim(text.format(name.replace("_", " ")), paper, run, (paths.format(name),))
-        for name in TARGETS
+        Claim(text.format(NAMES[name]), paper, run, (paths.format(name),)) for name in TARGETS
     )
 
 
@@ -35,7 +39,7 @@ LONG = Part(
     ),
     tuple(
         Claim(
-            f"no drift in 1000 s, {name.replace('_', ' ')}: the last 50 s over the second 50 s",
+            f"no drift in 1000 s, {NAMES[name]}: the last 50 s over the second 50 s",
             "stable for 10^6 steps", "long_run", (f"{name}/windows/orbit_error_ratio",),
             kind="ratio", limit=1.1,
         )

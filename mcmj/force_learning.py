@@ -1,0 +1,231 @@
+"""FORCE learning: the loop is closed from the start, and the readout made right as it runs.
+
+Under a teacher a body sees only the states near what it is taught. Where its outputs act at
+once, as muscles do, they are also what its springs show best, and a regression then learns to
+say what has just been said. Here the body's own outputs drive it, and recursive least squares
+(mcmj.rls) corrects the readout so often that they stay near the target: the states that its
+own errors lead to are learned from too (Sussillo and Abbott, Neuron 63, 2009). What remains
+is a linear, static readout, as a regression's.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, fields
+
+import numpy as np
+
+from mcmj import metrics, walkmetrics
+from mcmj.errors import DivergenceError
+from mcmj.progress import OnSteps
+from mcmj.readout import Fit, Regression
+from mcmj.rls import RecursiveLeastSquares
+from mcmj.streams import stream
+from mcmj.targets import Target
+from mcmj.trunk import N_MUSCLES
+from mcmj.trunk_walker import TrunkWalker
+from mcmj.validation import Array, require_count, require_number
+
+RAMP = 1.0  # s over which a teacher begins
+
+
+@dataclass(frozen=True)
+class ForceLearning:
+    """How a robot learns.
+
+    Attributes:
+        period: a readout is corrected once in this time [s].
+        ridge: penalty of the squared weights, in squared lengths [m^2].
+        warm_up: first, the teacher drives the muscles, the loop open [s] ..
+        washout: .. and nothing is learned at the beginning of that [s].
+        noise: on the muscles' commands, over their RMS change of length ..
+        noise_hold: .. each held for this time [s].
+        rounds: of learning in closed loop, at most.
+        round_duration: of each [s].
+        trial: after each, a free run [s] whose last half is judged; the best round counts.
+        good_enough: orbit error of a trial at which learning ends.
+
+    Raises:
+        InvalidArgumentError: a number out of bounds.
+    """
+
+    period: float = 5e-3
+    ridge: float = 5e-9
+    warm_up: float = 6.0
+    washout: float = 3.0
+    noise: float = 0.1
+    noise_hold: float = 0.05
+    rounds: int = 4
+    round_duration: float = 20.0
+    trial: float = 20.0
+    good_enough: float = 0.05
+
+    def __post_init__(self) -> None:
+        require_count("rounds", self.rounds, 1)
+        for field in fields(self):
+            if field.name != "rounds":
+                low_open = field.name != "noise"
+                require_number(field.name, getattr(self, field.name), 0.0, open_low=low_open)
+
+
+@dataclass(frozen=True)
+class Learned:
+    """The best readout, and how learning went.
+
+    Attributes:
+        w_out: (n_sensed + 1, N_MUSCLES).
+        errors: orbit error of the trial after each round; infinite after a fall.
+        state: of the robot at the end of the round that counts.
+    """
+
+    w_out: Array
+    errors: tuple[float, ...]
+    state: Array
+
+
+def force_learn(
+    walker: TrunkWalker,
+    target: Target,
+    learning: ForceLearning,
+    *,
+    seed: int,
+    on_steps: OnSteps = lambda steps: None,
+) -> Learned:
+    """Teach a standing robot a gait; it is left in it, in closed loop, with the best readout.
+
+    Args:
+        target: of the muscles, see mcmj.trunk.muscle_target.
+        seed: of the noise.
+        on_steps: called with the number of steps done, for progress bars.
+
+    Raises:
+        DivergenceError: the robot blew up in its first round.
+    """
+    lessons = _Lessons(walker, target, learning, seed, on_steps)
+    walker.stand()
+    lessons.warm_up()
+    best, errors = None, []
+    for _ in range(learning.rounds):
+        try:
+            lessons.round()
+        except DivergenceError:
+            if best is None:
+                raise
+            break
+        w_out, state = walker.w_out, walker.state
+        errors.append(trial_error(walker, target, learning.trial))
+        on_steps(round(learning.trial / walker.timestep))
+        walker.restore(state)
+        if errors[-1] <= min(errors):
+            best = w_out, state
+        if errors[-1] <= learning.good_enough:
+            break
+    assert best is not None
+    walker.set_readout(best[0])
+    walker.restore(best[1])
+    return Learned(best[0], tuple(errors), best[1])
+
+
+class _Lessons:
+    """What one robot has heard and learned of one target; the teacher's clock goes on."""
+
+    def __init__(
+        self,
+        walker: TrunkWalker,
+        target: Target,
+        learning: ForceLearning,
+        seed: int,
+        on_steps: OnSteps,
+    ) -> None:
+        self._walker, self._target, self._learning = walker, target, learning
+        self._rng, self._on_steps = stream(seed, "teacher_noise"), on_steps
+        n_features = walker.trunk.n_sensed + 1
+        self._squares = RecursiveLeastSquares(n_features, N_MUSCLES, ridge=learning.ridge)
+        self._every = max(1, round(learning.period / walker.timestep))
+        self._period = self._every * walker.timestep
+        self._done = 0
+
+    def warm_up(self) -> None:
+        """The teacher drives the muscles, the loop open."""
+        walker, learning = self._walker, self._learning
+        for time, noise in self._moments(learning.warm_up):
+            wanted = self._target.sample([time])[0]
+            if time >= learning.washout:
+                self._squares.update(walker.features(), wanted)
+            walker.advance(self._every, min(1.0, time / RAMP) * wanted + noise)
+
+    def round(self) -> None:
+        """The robot drives itself, and is corrected."""
+        walker = self._walker
+        walker.close(True)
+        for time, noise in self._moments(self._learning.round_duration):
+            self._squares.update(walker.features(), self._target.sample([time])[0])
+            walker.set_readout(self._squares.weights)
+            walker.advance(self._every, noise)
+
+    def _moments(self, duration: float) -> Iterator[tuple[float, Array]]:
+        """Times [s] and noise (N_MUSCLES,) [m] of the next corrections."""
+        count = round(duration / self._period)
+        hold = max(1, round(self._learning.noise_hold / self._period))
+        size = self._learning.noise * rms_command(self._target)
+        noise = size * self._rng.standard_normal((-(-count // hold), N_MUSCLES))
+        for k in range(count):
+            yield self._done * self._period, noise[k // hold]
+            self._done += 1
+        self._on_steps(count * self._every)
+
+
+def rms_command(target: Target) -> float:
+    """Root mean square change of a muscle's length about its mean [m]."""
+    return metrics.rms_radius(target.orbit(metrics.ORBIT_POINTS)) / np.sqrt(N_MUSCLES)
+
+
+def learn_by_regression(
+    walker: TrunkWalker,
+    target: Target,
+    learning: ForceLearning,
+    *,
+    duration: float,
+    noise: float,
+    ridge_per_row: float,
+    seed: int,
+) -> Fit:
+    """Teach a standing robot by plain ridge regression; it is left in closed loop with the readout.
+
+    Args:
+        learning: its period, warm-up, washout and noise_hold are used.
+        duration: of the teacher's driving after the warm-up [s].
+        noise: on the commands, held as in learning, over their RMS change of length.
+        ridge_per_row: [m^2].
+        seed: of the noise.
+    """
+    every = max(1, round(learning.period / walker.timestep))
+    step = every * walker.timestep
+    count = round((learning.warm_up + duration) / step)
+    times = step * np.arange(count)
+    wanted = target.sample(times)
+    disturbed = np.minimum(1.0, times / RAMP)[:, None] * wanted
+    disturbed += (
+        noise * rms_command(target) * stream(seed, "teacher_noise").standard_normal(wanted.shape)
+    )
+    rows = np.empty((count, walker.trunk.n_sensed))
+    walker.stand()
+    for k in range(count):
+        rows[k] = walker.features()[:-1]
+        walker.advance(every, disturbed[k])
+    late = times >= learning.washout
+    regression = Regression(bias=True)
+    regression.add(rows[late], wanted[late])
+    fit = regression.solve(ridge=ridge_per_row * late.sum())
+    walker.set_readout(fit.w_out)
+    walker.close(True)
+    return fit
+
+
+def trial_error(walker: TrunkWalker, target: Target, duration: float) -> float:
+    """Orbit error of the commands in the last half of a free run; infinite after a fall."""
+    try:
+        walk = walker.walk(duration)
+    except DivergenceError:
+        return float("inf")
+    if np.isfinite(walkmetrics.fall_times(walk, walker.trunk.settings.leg)[0]):
+        return float("inf")
+    return metrics.orbit_error(walk.after(duration / 2).outputs[0], target)

@@ -1,0 +1,87 @@
+"""Figure of a walking trunk: the robot, its muscles' commands, its feet on the ground."""
+
+from collections.abc import Mapping
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection
+from matplotlib.figure import Figure
+
+from mcmj.gaits import LEGS
+from mcmj.plotting import TARGET_COLOUR, best_phase, new_figure
+from mcmj.targets import Target
+from mcmj.trunk import Trunk
+from mcmj.walkmetrics import Walk
+
+PERIODS = 3.0  # of each gait that are shown
+BAR = 0.7
+MUSCLE = "#7d3b9e"
+
+
+def trunk_figure(trunk: Trunk, walks: Mapping[str, tuple[Target, Walk]]) -> Figure:
+    """The robot as drawn; below, gait by gait, commands of a fore leg on their target, and feet.
+
+    Args:
+        walks: by gait, the muscles' target and a walk.
+    """
+    figure = new_figure(3.1 * max(2, len(walks)), 7.4)
+    grid = figure.add_gridspec(3, len(walks), height_ratios=(1.5, 1.2, 0.8))
+    draw_trunk_body(figure.add_subplot(grid[0, :]), trunk)
+    for column, (name, (target, walk)) in enumerate(walks.items()):
+        last = walk.after(walk.times[-1] - PERIODS * target.period)
+        commands = figure.add_subplot(grid[1, column])
+        _commands(commands, name, target, last)
+        feet = figure.add_subplot(grid[2, column], sharex=commands)
+        _feet(feet, last)
+        if column == 0:
+            commands.set_ylabel("change of length [mm]")
+            figure.legend(*commands.get_legend_handles_labels(), loc=(0.02, 0.62), frameon=False)
+        commands.tick_params(labelbottom=False)
+    return figure
+
+
+def draw_trunk_body(axes: Axes, trunk: Trunk) -> None:
+    """Trunk, muscles, feet and ground, with a legend."""
+    body, n = trunk.body, trunk.settings.nodes
+    lines = list(body.positions[body.springs])
+    springs, muscles = lines[: trunk.n_sensed], lines[trunk.n_sensed :]
+    axes.add_collection(LineCollection(springs, colors="0.55", lw=1.0, label="springs, sensed"))
+    axes.add_collection(LineCollection(muscles, colors=MUSCLE, lw=2.2, label="muscles, driven"))
+    axes.plot(*body.positions[:n].T, "o", color="0.3", ms=4)
+    axes.plot(*body.positions[n:].T, "o", color="black", ms=7, label="feet")
+    axes.axhline(-trunk.settings.foot, color="0.4", lw=1.5)
+    for leg, (x, y) in zip(LEGS, body.positions[n:], strict=True):
+        axes.annotate(leg, (x, y), (10, 2), textcoords="offset points", fontsize=8)
+    axes.set(aspect="equal", xlabel="x [m], forwards", ylabel="height [m]")
+    axes.set_title(f"The robot: {n} nodes, {trunk.n_sensed} springs, {trunk.mass:g} kg")
+    axes.legend(loc="center left", bbox_to_anchor=(1.02, 0.5), frameon=False)
+    axes.margins(0.05)
+    axes.spines[["right", "top"]].set_visible(False)
+
+
+def _commands(axes: Axes, name: str, target: Target, walk: Walk) -> None:
+    times = walk.times - walk.times[0]
+    outputs = walk.outputs[0]
+    phase = best_phase(outputs, target, times)
+    wanted = target.sample(times + phase)
+    styles = (("black", "-"), ("#1f4fd6", "--"))
+    for muscle, (colour, style) in enumerate(styles):
+        axes.plot(times, 1e3 * wanted[:, muscle], color=TARGET_COLOUR, lw=3, alpha=0.5,
+                  label="target" if muscle == 0 else None)  # fmt: skip
+        label = f"LF, {('fore', 'rear')[muscle]} muscle"
+        axes.plot(times, 1e3 * outputs[:, muscle], style, color=colour, lw=1.2, label=label)
+    axes.set(title=name, xlim=(0, times[-1]))
+    axes.spines[["right", "top"]].set_visible(False)
+
+
+def _feet(axes: Axes, walk: Walk) -> None:
+    times = walk.times - walk.times[0]
+    for leg in range(len(LEGS)):
+        down = np.r_[False, walk.contact[0, :, leg] > 0, False].astype(int)
+        edges = np.flatnonzero(np.diff(down)).reshape(-1, 2)
+        spans = [(times[a], times[b - 1] - times[a]) for a, b in edges]
+        axes.broken_barh(spans, (len(LEGS) - 1 - leg - BAR / 2, BAR), facecolors="black", lw=0)
+    axes.set_yticks(np.arange(len(LEGS))[::-1], LEGS)
+    axes.set(xlabel="time [s], feet on the ground")
+    axes.spines[["left", "right", "top"]].set_visible(False)
+    axes.tick_params(axis="y", length=0)
