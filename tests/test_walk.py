@@ -257,7 +257,7 @@ def test_errors_name_the_argument(body):
     with pytest.raises(InvalidArgumentError, match="coupling: expected a number other than 0"):
         Config(coupling=0.0)
     with pytest.raises(InvalidArgumentError, match="after: expected"):
-        Config(after=1.0)
+        Config(parts=("adapt",), after=1.0)
     with pytest.raises(InvalidArgumentError, match="leg: expected"):
         Quadruped(leg=-1.0)
     with pytest.raises(InvalidArgumentError, match="body: expected 4 inputs and outputs"):
