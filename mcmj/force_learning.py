@@ -1,14 +1,14 @@
-"""FORCE learning: the loop is closed from the start, and the readout made right as it runs.
+"""FORCE learning: the loop is closed while the readout is made right.
 
 Under a teacher a body sees only the states near what it is taught. Where its outputs act at
-once, as muscles do, they are also what its springs show best, and a regression then learns to
-say what has just been said. Here the body's own outputs drive it, and recursive least squares
-(mcmj.rls) corrects the readout so often that they stay near the target: the states that its
-own errors lead to are learned from too (Sussillo and Abbott, Neuron 63, 2009). What remains
-is a linear, static readout, as a regression's.
+once, as muscles do, its springs mostly show the last command, and a regression learns to echo
+it instead of leading it. So a teacher only begins: then the body's own outputs drive it, and
+recursive least squares (mcmj.rls) corrects the readout so often that they stay near the target.
+The states that its own errors lead to are learned from too (Sussillo and Abbott, Neuron 63,
+2009). What remains is a linear, static readout, as a regression's.
 """
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, fields
 
 import numpy as np
@@ -34,7 +34,7 @@ class ForceLearning:
     Attributes:
         period: a readout is corrected once in this time [s].
         ridge: penalty of the squared weights, in squared lengths [m^2].
-        warm_up: first, the teacher drives the muscles, the loop open [s] ..
+        warm_up: first, and after a fall, the teacher drives the muscles, the loop open [s] ..
         washout: .. and nothing is learned at the beginning of that [s].
         noise: on the muscles' commands, over their RMS change of length ..
         noise_hold: .. each held for this time [s].
@@ -64,6 +64,8 @@ class ForceLearning:
             if field.name != "rounds":
                 low_open = field.name != "noise"
                 require_number(field.name, getattr(self, field.name), 0.0, open_low=low_open)
+        for name in ("round_duration", "trial"):
+            require_number(name, getattr(self, name), 1.0)
 
 
 @dataclass(frozen=True)
@@ -89,7 +91,9 @@ def force_learn(
     seed: int,
     on_steps: OnSteps = lambda steps: None,
 ) -> Learned:
-    """Teach a standing robot a gait; it is left in it, in closed loop, with the best readout.
+    """Teach a robot a gait; it is left in it, in closed loop, with the best readout.
+
+    A robot that falls in a trial stands up and is led by the teacher again.
 
     Args:
         target: of the muscles, see mcmj.trunk.muscle_target.
@@ -100,12 +104,14 @@ def force_learn(
         DivergenceError: the robot blew up in its first round.
     """
     lessons = _Lessons(walker, target, learning, seed, on_steps)
-    walker.stand()
-    lessons.warm_up()
-    best, errors = None, []
+    squares = RecursiveLeastSquares(walker.trunk.n_sensed + 1, N_MUSCLES, ridge=learning.ridge)
+    best: tuple[Array, Array] | None = None
+    errors: list[float] = []
     for _ in range(learning.rounds):
         try:
-            lessons.round()
+            if not errors or np.isinf(errors[-1]):
+                lessons.lead(learning.warm_up, squares.update)
+            lessons.correct(learning.round_duration, squares)
         except DivergenceError:
             if best is None:
                 raise
@@ -119,13 +125,41 @@ def force_learn(
         if errors[-1] <= learning.good_enough:
             break
     assert best is not None
+    walker.close(True)
     walker.set_readout(best[0])
     walker.restore(best[1])
     return Learned(best[0], tuple(errors), best[1])
 
 
+def learn_by_regression(
+    walker: TrunkWalker, target: Target, learning: ForceLearning, *, duration: float, seed: int
+) -> Fit:
+    """Teach a robot by plain ridge regression; it is left in closed loop with the readout.
+
+    Noise and ridge are those of learning (Hauser et al. 2012, section 4, has such noise on what
+    is fed back).
+
+    Args:
+        duration: of the teacher's driving that is learned from [s].
+        seed: of the noise.
+
+    Raises:
+        DivergenceError: the robot blew up.
+    """
+    lessons = _Lessons(walker, target, learning, seed, lambda steps: None)
+    samples: list[tuple[Array, Array]] = []
+    lessons.lead(learning.washout + duration, lambda *sample: samples.append(sample))
+    features, wanted = (np.array(each) for each in zip(*samples, strict=True))
+    regression = Regression(bias=True)
+    regression.add(features[:, :-1], wanted)
+    fit = regression.solve(ridge=learning.ridge)
+    walker.set_readout(fit.w_out)
+    walker.close(True)
+    return fit
+
+
 class _Lessons:
-    """What one robot has heard and learned of one target; the teacher's clock goes on."""
+    """One robot and its teacher, whose clock goes on."""
 
     def __init__(
         self,
@@ -137,87 +171,44 @@ class _Lessons:
     ) -> None:
         self._walker, self._target, self._learning = walker, target, learning
         self._rng, self._on_steps = stream(seed, "teacher_noise"), on_steps
-        n_features = walker.trunk.n_sensed + 1
-        self._squares = RecursiveLeastSquares(n_features, N_MUSCLES, ridge=learning.ridge)
         self._every = max(1, round(learning.period / walker.timestep))
         self._period = self._every * walker.timestep
         self._done = 0
 
-    def warm_up(self) -> None:
-        """The teacher drives the muscles, the loop open."""
-        walker, learning = self._walker, self._learning
-        for time, noise in self._moments(learning.warm_up):
-            wanted = self._target.sample([time])[0]
-            if time >= learning.washout:
-                self._squares.update(walker.features(), wanted)
-            walker.advance(self._every, min(1.0, time / RAMP) * wanted + noise)
+    def lead(self, duration: float, hear: Callable[[Array, Array], object]) -> None:
+        """The robot stands up, then the teacher drives its muscles, the loop open.
 
-    def round(self) -> None:
-        """The robot drives itself, and is corrected."""
+        Args:
+            hear: gets features and what the muscles are told, after the washout.
+        """
+        walker, begin = self._walker, self._done * self._period
+        walker.stand()
+        for time, noise in self._moments(duration):
+            wanted = self._target.sample([time])[0]
+            if time - begin >= self._learning.washout:
+                hear(walker.features(), wanted)
+            walker.advance(self._every, min(1.0, (time - begin) / RAMP) * wanted + noise)
+
+    def correct(self, duration: float, squares: RecursiveLeastSquares) -> None:
+        """The robot drives itself, and its readout is corrected."""
         walker = self._walker
         walker.close(True)
-        for time, noise in self._moments(self._learning.round_duration):
-            self._squares.update(walker.features(), self._target.sample([time])[0])
-            walker.set_readout(self._squares.weights)
+        for time, noise in self._moments(duration):
+            squares.update(walker.features(), self._target.sample([time])[0])
+            walker.set_readout(squares.weights)
             walker.advance(self._every, noise)
 
     def _moments(self, duration: float) -> Iterator[tuple[float, Array]]:
         """Times [s] and noise (N_MUSCLES,) [m] of the next corrections."""
         count = round(duration / self._period)
         hold = max(1, round(self._learning.noise_hold / self._period))
-        size = self._learning.noise * rms_command(self._target)
+        radius = metrics.rms_radius(self._target.orbit(metrics.ORBIT_POINTS))
+        size = self._learning.noise * radius / np.sqrt(N_MUSCLES)
         noise = size * self._rng.standard_normal((-(-count // hold), N_MUSCLES))
         for k in range(count):
             yield self._done * self._period, noise[k // hold]
             self._done += 1
         self._on_steps(count * self._every)
-
-
-def rms_command(target: Target) -> float:
-    """Root mean square change of a muscle's length about its mean [m]."""
-    return metrics.rms_radius(target.orbit(metrics.ORBIT_POINTS)) / np.sqrt(N_MUSCLES)
-
-
-def learn_by_regression(
-    walker: TrunkWalker,
-    target: Target,
-    learning: ForceLearning,
-    *,
-    duration: float,
-    noise: float,
-    ridge_per_row: float,
-    seed: int,
-) -> Fit:
-    """Teach a standing robot by plain ridge regression; it is left in closed loop with the readout.
-
-    Args:
-        learning: its period, warm-up, washout and noise_hold are used.
-        duration: of the teacher's driving after the warm-up [s].
-        noise: on the commands, held as in learning, over their RMS change of length.
-        ridge_per_row: [m^2].
-        seed: of the noise.
-    """
-    every = max(1, round(learning.period / walker.timestep))
-    step = every * walker.timestep
-    count = round((learning.warm_up + duration) / step)
-    times = step * np.arange(count)
-    wanted = target.sample(times)
-    disturbed = np.minimum(1.0, times / RAMP)[:, None] * wanted
-    disturbed += (
-        noise * rms_command(target) * stream(seed, "teacher_noise").standard_normal(wanted.shape)
-    )
-    rows = np.empty((count, walker.trunk.n_sensed))
-    walker.stand()
-    for k in range(count):
-        rows[k] = walker.features()[:-1]
-        walker.advance(every, disturbed[k])
-    late = times >= learning.washout
-    regression = Regression(bias=True)
-    regression.add(rows[late], wanted[late])
-    fit = regression.solve(ridge=ridge_per_row * late.sum())
-    walker.set_readout(fit.w_out)
-    walker.close(True)
-    return fit
 
 
 def trial_error(walker: TrunkWalker, target: Target, duration: float) -> float:

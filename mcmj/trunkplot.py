@@ -34,6 +34,7 @@ def trunk_figure(trunk: Trunk, walks: Mapping[str, tuple[Target, Walk]]) -> Figu
         feet = figure.add_subplot(grid[2, column], sharex=commands)
         _feet(feet, last)
         if column == 0:
+            feet.set_ylabel("feet on the ground")
             commands.set_ylabel("change of length [mm]")
             figure.legend(*commands.get_legend_handles_labels(), loc=(0.02, 0.62), frameon=False)
         commands.tick_params(labelbottom=False)
@@ -82,6 +83,6 @@ def _feet(axes: Axes, walk: Walk) -> None:
         spans = [(times[a], times[b - 1] - times[a]) for a, b in edges]
         axes.broken_barh(spans, (len(LEGS) - 1 - leg - BAR / 2, BAR), facecolors="black", lw=0)
     axes.set_yticks(np.arange(len(LEGS))[::-1], LEGS)
-    axes.set(xlabel="time [s], feet on the ground")
+    axes.set(xlabel="time [s]")
     axes.spines[["left", "right", "top"]].set_visible(False)
     axes.tick_params(axis="y", length=0)

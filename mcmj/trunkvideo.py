@@ -65,7 +65,7 @@ def _picture(walker: TrunkWalker, renderer: mujoco.Renderer, qpos: Array, trunk:
     mujoco.mj_forward(model, data)
     rest = walker.trunk.body.rest_lengths[:n]
     model.tendon_rgba[:n, :3] = strain_colours(data.ten_length[:n] / rest - 1, FULL_STRAIN)
-    model.tendon_rgba[n : n + len(walker.trunk.body.springs) - n, :3] = MUSCLE
+    model.tendon_rgba[n : walker.trunk.body.n_springs, :3] = MUSCLE
     camera = mujoco.MjvCamera()
     camera.type = mujoco.mjtCamera.mjCAMERA_FREE
     camera.lookat[:] = [trunk[0], 0.8 * walker.trunk.settings.leg, 0.0]

@@ -15,16 +15,23 @@ from mcmj.experiments.trunk import Result, run
 from mcmj.experiments.trunk_config import Config, total_seconds
 from mcmj.plotting import save
 from mcmj.progress import progress_bar
+from mcmj.trunk_walker import TIMESTEP
 from mcmj.trunkplot import trunk_figure
 
-STEPS_PER_SECOND = 1000
 SHOWN = 5.0  # seconds of each gait in the film
 
 
 def work(config: Config, output: Output, out: Path) -> None:
-    total = round(total_seconds(config) * STEPS_PER_SECOND)
+    total = round(total_seconds(config) / TIMESTEP)
     with progress_bar("walking", total, quiet=output.quiet) as on_steps:
         result = run(config, on_steps=on_steps)
+    store.write_metrics(out / "metrics.json", "trunk", config, config.seed, result.metrics)
+    arrays = {
+        f"{name}/w_out": gait.learned.w_out
+        for name, gait in result.gaits.items()
+        if gait.learned is not None
+    }
+    store.write_arrays(out / "readouts.npz", arrays, config, config.seed)
     walks = {
         name: (gait.target, gait.walk)
         for name, gait in result.gaits.items()
@@ -35,13 +42,6 @@ def work(config: Config, output: Output, out: Path) -> None:
         save(trunk_figure(trunk, walks), out / "trunk.png")
         if output.video:
             film(result, out)
-    arrays = {
-        f"{name}/w_out": gait.learned.w_out
-        for name, gait in result.gaits.items()
-        if gait.learned is not None
-    }
-    store.write_arrays(out / "readouts.npz", arrays, config, config.seed)
-    store.write_metrics(out / "metrics.json", "trunk", config, config.seed, result.metrics)
     if not output.quiet:
         show(result, out)
 

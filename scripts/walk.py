@@ -24,10 +24,10 @@ SHOWN = 4.0  # seconds of footfalls in the figure
 def work(config: Config, output: Output, out: Path) -> None:
     with progress_bar("walking", total_steps(config), quiet=output.quiet) as on_steps:
         result = run(config, on_steps=on_steps)
+    store.write_metrics(out / "metrics.json", "walk", config, config.seed, result.metrics)
     draw(result, out)
     if output.video:
         film(result, out)
-    store.write_metrics(out / "metrics.json", "walk", config, config.seed, result.metrics)
     if not output.quiet:
         show(result, out)
 

@@ -9,7 +9,7 @@ from functools import partial
 
 import numpy as np
 
-from mcmj import metrics, walkmetrics
+from mcmj import gaitmetrics, metrics, walkmetrics
 from mcmj.errors import DivergenceError
 from mcmj.experiments.trunk_config import Config
 from mcmj.force_learning import Learned, force_learn, learn_by_regression, trial_error
@@ -19,11 +19,15 @@ from mcmj.rates import success_rate
 from mcmj.targets import Target
 from mcmj.threads import in_threads
 from mcmj.trunk import Trunk, draw_trunk, muscle_target
-from mcmj.trunk_walker import TrunkWalker
+from mcmj.trunk_walker import TIMESTEP, TrunkWalker
 from mcmj.validation import Array
 from mcmj.walkmetrics import Walk
 
 Table = dict[str, object]
+_MEASURED = (
+    "distance_m", "speed_m_s", "cost_of_transport", "orbit_error", "stride_period_s",
+    "duty_factors", "foot_lags",
+)  # fmt: skip
 TAUGHT = 0.1  # orbit error below which a gait counts as the one that was taught
 
 
@@ -100,25 +104,37 @@ def walk_table(config: Config, gait: Gait) -> Table:
     """How a walk went; what a robot that fell did not do is None."""
     if gait.walk is None or gait.learned is None:
         return {"falls": 1}
-    walk, trunk = gait.walk, gait.trunk
-    last = walk.after(config.walking - config.judged)
-    fallen = bool(np.isfinite(walkmetrics.fall_times(walk, trunk.settings.leg)[0]))
-    measured = {
-        "distance_m": walkmetrics.distances(walk)[0],
-        "speed_m_s": walkmetrics.speeds(last)[0],
-        "cost_of_transport": walkmetrics.costs_of_transport(last, GRAVITY * trunk.mass)[0],
-        "orbit_error": metrics.orbit_error(last.outputs[0], gait.target),
-        "stride_period_s": walkmetrics.stride_period(last, gait.target.period),
-        "duty_factors": (last.contact[0] > 0).mean(axis=0),
-    }
-    if fallen:
-        measured = dict.fromkeys(measured, None)
-    return {
-        "falls": int(fallen),
-        **measured,
+    walk, last = gait.walk, gait.walk.after(config.walking - config.judged)
+    told = {
         "taught_period_s": gait.target.period,
         "trial_errors": list(gait.learned.errors),
     }
+    if fell(gait, walk):
+        return {"falls": 1} | dict.fromkeys(_MEASURED) | told
+    period = metrics.period_or_nan(last.outputs[0], last.sample, gait.target)
+    feet = (last.contact[0] > 0).astype(np.float64)
+    repeats = np.isfinite(period)
+    measured = (
+        walk.trunk[0, -1, 0] - walk.trunk[0, 0, 0],
+        forward_speed(last),
+        walkmetrics.costs_of_transport(last, GRAVITY * gait.trunk.mass)[0],
+        metrics.orbit_error(last.outputs[0], gait.target),
+        period,
+        feet.mean(axis=0),
+        gaitmetrics.phase_lags(feet, last.sample, period) if repeats else None,
+    )
+    return {"falls": 0} | dict(zip(_MEASURED, measured, strict=True)) | told
+
+
+def forward_speed(walk: Walk) -> float:
+    """Way forwards over time [m/s], negative backwards."""
+    way = walk.trunk[0, -1, 0] - walk.trunk[0, 0, 0]
+    return float(way / (walk.times[-1] - walk.times[0]))
+
+
+def fell(gait: Gait, walk: Walk) -> bool:
+    """Whether the trunk tilts by over 60 degrees, or sinks below half a leg (walkmetrics)."""
+    return bool(np.isfinite(walkmetrics.fall_times(walk, gait.trunk.settings.leg)[0]))
 
 
 def seeds_table(config: Config, found: dict[tuple[int, str], Gait]) -> Table:
@@ -140,22 +156,17 @@ def seeds_table(config: Config, found: dict[tuple[int, str], Gait]) -> Table:
 
 
 def by_regression(config: Config, gaits: dict[str, Gait], name: str, on_steps: OnSteps) -> Table:
-    """The same robot taught by plain regression: orbit error of a free run, infinite if it falls.
-
-    Ridge and noise are the config's; the teacher's noise is what a regression has against
-    its own errors (Hauser et al. 2012, section 4).
-    """
+    """Orbit error of a free run after plain regression, infinite if the robot falls."""
     gait = gaits[name]
     walker = TrunkWalker(gait.trunk)
     try:
         fit = learn_by_regression(
-            walker, gait.target, config.learning, duration=config.teaching,
-            noise=config.teacher_noise, ridge_per_row=config.ridge_per_row, seed=config.seed,
-        )  # fmt: skip
+            walker, gait.target, config.learning, duration=config.teaching, seed=config.seed
+        )
         error = trial_error(walker, gait.target, config.walking)
     except DivergenceError:
         return {"train_nrmse": None, "orbit_error": np.inf}
-    on_steps(round((config.teaching + config.walking) / walker.timestep))
+    on_steps(round((config.learning.washout + config.teaching + config.walking) / walker.timestep))
     return {"train_nrmse": fit.train_nrmse, "orbit_error": error}
 
 
@@ -171,22 +182,22 @@ def from_rest(config: Config, gaits: dict[str, Gait], name: str, on_steps: OnSte
 
 
 def push(config: Config, gaits: dict[str, Gait], name: str, on_steps: OnSteps) -> dict[float, int]:
-    """How many pushes of each size a gait survives, and is back in its rhythm after."""
+    """How many pushes of each size, both ways at every moment, do not end in a fall."""
     gait = gaits[name]
     walker = gait.walker()
-    survived = {}
     moments: list[Array] = []
     for _ in range(config.pushes):
         moments.append(walker.state)
         walker.advance(round(gait.target.period / config.pushes / walker.timestep))
+    survived = {}
     for impulse in sorted(config.impulses):
-        count = 0
-        for k, moment in enumerate(moments):
-            walker.restore(moment)
-            walk = walker.walk(config.survive, push=impulse if k % 2 else -impulse)
-            count += not np.isfinite(walkmetrics.fall_times(walk, gait.trunk.settings.leg)[0])
-        survived[impulse] = count
-        on_steps(round(config.pushes * config.survive / walker.timestep))
+        ends = []
+        for moment in moments:
+            for way in (impulse, -impulse):
+                walker.restore(moment)
+                ends.append(_end_of(config, gait, walker, config.survive, push=way))
+        survived[impulse] = sum(end["falls"] == 0 for end in ends)
+        on_steps(round(len(ends) * config.survive / walker.timestep))
     return survived
 
 
@@ -210,7 +221,7 @@ def step_study(config: Config, gaits: dict[str, Gait], name: str, on_steps: OnSt
     for step in config.steps_ms:
         walker = gaits[name].walker(timestep=1e-3 * step)
         table[f"{step:g}"] = _end_of(config, gaits[name], walker, config.walking)
-        on_steps(round(config.walking / walker.timestep))
+        on_steps(round(config.walking / TIMESTEP))
     return table
 
 
@@ -220,22 +231,22 @@ def push_summary(config: Config, survived: dict[str, dict[float, int]]) -> Table
         name: {f"{impulse:g}": count for impulse, count in row.items()}
         for name, row in survived.items()
     }
-    return {"survived": counts, "of": config.pushes}
+    return {"survived": counts, "of": 2 * config.pushes}
 
 
-def _end_of(config: Config, gait: Gait, walker: TrunkWalker, duration: float) -> Table:
+def _end_of(
+    config: Config, gait: Gait, walker: TrunkWalker, duration: float, *, push: float = 0.0
+) -> Table:
     """How a walk from now on ends: its last part, half of it at most."""
     try:
-        walk = walker.walk(duration)
+        walk = walker.walk(duration, push=push)
     except DivergenceError:
         return {"falls": 1, "speed_m_s": None, "orbit_error": None}
-    fallen = bool(np.isfinite(walkmetrics.fall_times(walk, gait.trunk.settings.leg)[0]))
+    if fell(gait, walk):
+        return {"falls": 1, "speed_m_s": None, "orbit_error": None}
     last = walk.after(duration - min(config.judged, duration / 2))
-    return {
-        "falls": int(fallen),
-        "speed_m_s": None if fallen else walkmetrics.speeds(last)[0],
-        "orbit_error": None if fallen else metrics.orbit_error(last.outputs[0], gait.target),
-    }
+    error = metrics.orbit_error(last.outputs[0], gait.target)
+    return {"falls": 0, "speed_m_s": forward_speed(last), "orbit_error": error}
 
 
 _PARTS: dict[str, Callable[[Config, dict[str, Gait], str, OnSteps], object]] = {

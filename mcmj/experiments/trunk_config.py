@@ -26,11 +26,9 @@ class Config:
         pace: of the gaits, as many times faster than mcmj.gaits.
         walking: a walk of each gait after learning [s] ..
         judged: .. whose last part is measured [s].
-        teaching: of the regression, after the warm-up of learning [s].
-        teacher_noise: of the regression, on the commands, over the target's RMS radius.
-        ridge_per_row: of the regression [m^2].
-        pushes: number of pushes of each size, at moments spread over a stride, for 0.1 s.
-        impulses: their sizes [N s], half of them forwards, half backwards.
+        teaching: what the regression learns from [s]; its noise and ridge are those of learning.
+        pushes: moments of a stride at which the robot is pushed, forwards and backwards.
+        impulses: sizes of the pushes [N s], for 0.1 s.
         survive: a push or switch is survived if the robot does not fall for so long [s].
         steps_ms: time steps of the part steps [ms].
         trunk: what robots are drawn from.
@@ -45,9 +43,7 @@ class Config:
     walking: float = 60.0
     judged: float = 20.0
     teaching: float = 60.0
-    teacher_noise: float = 0.2
-    ridge_per_row: float = 1e-9
-    pushes: int = 8
+    pushes: int = 4
     impulses: tuple[float, ...] = (5.0, 10.0, 20.0, 40.0)
     survive: float = 10.0
     steps_ms: tuple[float, ...] = (0.5, 1.0, 2.0)
@@ -61,9 +57,8 @@ class Config:
         require_count("seed", self.seed, 0)
         for name in ("seeds", "pushes"):
             require_count(name, getattr(self, name), 1)
-        for name in ("pace", "teaching", "ridge_per_row"):
+        for name in ("pace", "teaching", "walking"):
             require_number(name, getattr(self, name), 0.0, open_low=True)
-        require_number("teacher_noise", self.teacher_noise, 0.0)
         require_number("judged", self.judged, 1.0)
         require_number("survive", self.survive, 1.0 + PUSH_DURATION)
         if self.walking <= self.judged:
@@ -80,9 +75,9 @@ def total_seconds(config: Config) -> float:
     learning, gaits = config.learning, len(config.gaits)
     learn = learning.warm_up + learning.rounds * (learning.round_duration + learning.trial)
     parts = {
-        "regression": learning.warm_up + config.teaching + config.walking,
+        "regression": learning.washout + config.teaching + config.walking,
         "rest": config.walking,
-        "push": len(config.impulses) * config.pushes * config.survive,
+        "push": len(config.impulses) * 2 * config.pushes * config.survive,
         "switch": (gaits - 1) * config.survive,
         "steps": len(config.steps_ms) * config.walking,
     }
