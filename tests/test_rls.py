@@ -29,6 +29,17 @@ def test_after_every_sample_it_is_the_ridge_regression_of_all_so_far(seed, n, m,
         assert np.abs(squares.weights - expected).max() < 1e-9 * max(1.0, np.abs(expected).max())
 
 
+def test_thousands_of_samples_with_hardly_any_ridge():
+    rng = np.random.default_rng(0)
+    features = 3e-3 * rng.normal(size=(4000, 60)) @ rng.normal(size=(60, 60))
+    wanted = rng.normal(size=(4000, 8))
+    squares = RecursiveLeastSquares(60, 8, ridge=5e-9)
+    for f, y in zip(features, wanted, strict=True):
+        squares.update(f, y)
+    expected = ridge_solution(features, wanted, 5e-9)
+    assert np.abs(squares.weights - expected).max() < 1e-7 * np.abs(expected).max()
+
+
 @pytest.mark.parametrize("ridge", [0.0, -1.0, np.nan])
 def test_ridge_must_be_positive(ridge):
     with pytest.raises(InvalidArgumentError, match="ridge"):

@@ -294,6 +294,23 @@ def test_trunk(tmp_path):
 
 
 @pytest.mark.slow
+def test_all_parts_of_trunk(tmp_path):
+    options = ["--gaits", "trot", "bound", "--no-video", "--walking", "4", "--judged", "1.5"]
+    options += ["--rounds", "2", "--round-duration", "6", "--trial", "2", "--survive", "1.5"]
+    status, _, err = run("trunk", *options, "--teaching", "5", "--out", tmp_path)
+    assert status == 0, err
+    metrics = metrics_of(tmp_path)["metrics"]
+    for name in ("trot", "bound"):
+        assert metrics["regression"][name]["train_nrmse"] < 0.2
+        survived = list(metrics["push"]["survived"][name].values())
+        assert len(survived) == 4
+        assert 0 < survived[0] <= metrics["push"]["of"]
+    assert set(metrics["switch"]["trot"]) == {"bound"}
+    same = metrics["steps"]["trot"]["1"]  # the walk again
+    assert same["orbit_error"] == pytest.approx(metrics["trot"]["orbit_error"], rel=0.2)
+
+
+@pytest.mark.slow
 def test_certify(tmp_path):
     options = ["--task", "quadratic", "--body", "quadratic", "--free-run", "25", "--recovery", "25",
                "--scales", "1", "--phases", "2", "--kicks", "0.5", "--pushes", "1", "--copies", "4",
