@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping
 
-import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
@@ -12,9 +11,9 @@ from mcmj.plotting import TARGET_COLOUR, best_phase, new_figure
 from mcmj.targets import Target
 from mcmj.trunk import Trunk
 from mcmj.walkmetrics import Walk
+from mcmj.walkplot import draw_stance
 
 PERIODS = 3.0  # of each gait that are shown
-BAR = 0.7
 MUSCLE = "#7d3b9e"
 
 
@@ -32,7 +31,8 @@ def trunk_figure(trunk: Trunk, walks: Mapping[str, tuple[Target, Walk]]) -> Figu
         commands = figure.add_subplot(grid[1, column])
         _commands(commands, name, target, last)
         feet = figure.add_subplot(grid[2, column], sharex=commands)
-        _feet(feet, last)
+        draw_stance(feet, last)
+        feet.set(xlabel="time [s]")
         if column == 0:
             feet.set_ylabel("feet on the ground")
             commands.set_ylabel("change of length [mm]")
@@ -73,16 +73,3 @@ def _commands(axes: Axes, name: str, target: Target, walk: Walk) -> None:
         axes.plot(times, 1e3 * outputs[:, muscle], style, color=colour, lw=1.2, label=label)
     axes.set(title=name, xlim=(0, times[-1]))
     axes.spines[["right", "top"]].set_visible(False)
-
-
-def _feet(axes: Axes, walk: Walk) -> None:
-    times = walk.times - walk.times[0]
-    for leg in range(len(LEGS)):
-        down = np.r_[False, walk.contact[0, :, leg] > 0, False].astype(int)
-        edges = np.flatnonzero(np.diff(down)).reshape(-1, 2)
-        spans = [(times[a], times[b - 1] - times[a]) for a, b in edges]
-        axes.broken_barh(spans, (len(LEGS) - 1 - leg - BAR / 2, BAR), facecolors="black", lw=0)
-    axes.set_yticks(np.arange(len(LEGS))[::-1], LEGS)
-    axes.set(xlabel="time [s]")
-    axes.spines[["left", "right", "top"]].set_visible(False)
-    axes.tick_params(axis="y", length=0)

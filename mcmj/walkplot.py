@@ -33,18 +33,22 @@ def footfalls(walks: Mapping[str, Walk], titles: Mapping[str, str], *, shown: fl
     for axes in grid[len(walks) :]:
         axes.set_axis_off()
     for (name, walk), axes in zip(walks.items(), grid, strict=False):
-        last = walk.after(walk.times[-1] - shown)
-        times = last.times - last.times[0]
-        for leg in range(len(LEGS)):
-            down = np.r_[False, last.contact[0, :, leg] > 0, False].astype(int)
-            edges = np.flatnonzero(np.diff(down)).reshape(-1, 2)
-            spans = [(times[a], times[b - 1] - times[a]) for a, b in edges]
-            axes.broken_barh(spans, (len(LEGS) - 1 - leg - BAR / 2, BAR), facecolors="black", lw=0)
-        axes.set_yticks(np.arange(len(LEGS))[::-1], LEGS)
+        draw_stance(axes, walk.after(walk.times[-1] - shown))
         axes.set(xlim=(0, shown), title=titles[name], xlabel="time [s]")
-        axes.spines[["left", "right", "top"]].set_visible(False)
-        axes.tick_params(axis="y", length=0)
     return figure
+
+
+def draw_stance(axes: Axes, walk: Walk) -> None:
+    """A bar for each foot while it bears load, over the time since the walk's first sample [s]."""
+    times = walk.times - walk.times[0]
+    for leg in range(len(LEGS)):
+        down = np.r_[False, walk.contact[0, :, leg] > 0, False].astype(int)
+        edges = np.flatnonzero(np.diff(down)).reshape(-1, 2)
+        spans = [(times[a], times[b - 1] - times[a]) for a, b in edges]
+        axes.broken_barh(spans, (len(LEGS) - 1 - leg - BAR / 2, BAR), facecolors="black", lw=0)
+    axes.set_yticks(np.arange(len(LEGS))[::-1], LEGS)
+    axes.spines[["left", "right", "top"]].set_visible(False)
+    axes.tick_params(axis="y", length=0)
 
 
 def pushes(survived: Mapping[str, Mapping[str, int]], total: int) -> Figure:
