@@ -25,7 +25,9 @@ def trunk_figure(trunk: Trunk, walks: Mapping[str, tuple[Target, Walk]]) -> Figu
     """
     figure = new_figure(3.1 * max(2, len(walks)), 7.4)
     grid = figure.add_gridspec(3, len(walks), height_ratios=(1.5, 1.2, 0.8))
-    draw_trunk_body(figure.add_subplot(grid[0, :]), trunk)
+    robot = figure.add_subplot(grid[0, :])
+    draw_trunk_body(robot, trunk)
+    lines = dict(zip(*reversed(robot.get_legend_handles_labels()), strict=True))
     for column, (name, (target, walk)) in enumerate(walks.items()):
         last = walk.after(walk.times[-1] - PERIODS * target.period)
         commands = figure.add_subplot(grid[1, column])
@@ -36,13 +38,14 @@ def trunk_figure(trunk: Trunk, walks: Mapping[str, tuple[Target, Walk]]) -> Figu
         if column == 0:
             feet.set_ylabel("feet on the ground")
             commands.set_ylabel("change of length [mm]")
-            figure.legend(*commands.get_legend_handles_labels(), loc=(0.02, 0.62), frameon=False)
+            lines |= dict(zip(*reversed(commands.get_legend_handles_labels()), strict=True))
         commands.tick_params(labelbottom=False)
+    figure.legend(lines.values(), lines, loc="outside upper center", ncols=3, frameon=False)
     return figure
 
 
 def draw_trunk_body(axes: Axes, trunk: Trunk) -> None:
-    """Trunk, muscles, feet and ground, with a legend."""
+    """Trunk, muscles, feet and ground, labelled for a legend."""
     body, n = trunk.body, trunk.settings.nodes
     lines = list(body.positions[body.springs])
     springs, muscles = lines[: trunk.n_sensed], lines[trunk.n_sensed :]
@@ -55,7 +58,6 @@ def draw_trunk_body(axes: Axes, trunk: Trunk) -> None:
         axes.annotate(leg, (x, y), (10, 2), textcoords="offset points", fontsize=8)
     axes.set(aspect="equal", xlabel="x [m], forwards", ylabel="height [m]")
     axes.set_title(f"The robot: {n} nodes, {trunk.n_sensed} springs, {trunk.mass:g} kg")
-    axes.legend(loc="center left", bbox_to_anchor=(1.02, 0.5), frameon=False)
     axes.margins(0.05)
     axes.spines[["right", "top"]].set_visible(False)
 
