@@ -69,10 +69,12 @@ def require_number(
         raise InvalidArgumentError(name, f"a number in {left}{low:g}, {high:g}]", value)
 
 
-def require_count(name: str, value: int, low: int) -> None:
-    """Raise unless value is an integer >= low."""
-    if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < low:
-        raise InvalidArgumentError(name, f"an integer >= {low}", repr(value))
+def require_count(name: str, value: int, low: int, high: int | None = None) -> None:
+    """Raise unless value is an integer >= low, and <= high if there is one."""
+    whole = isinstance(value, int | np.integer) and not isinstance(value, bool)
+    if not whole or value < low or (high is not None and value > high):
+        wanted = f"an integer >= {low}" if high is None else f"an integer in [{low}, {high}]"
+        raise InvalidArgumentError(name, wanted, repr(value))
 
 
 def require_names(kind: str, given: Sequence[str], known: Collection[str]) -> None:

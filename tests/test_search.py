@@ -111,7 +111,7 @@ def test_an_experiment_without_bodies_or_engines_of_its_own(tmp_path, monkeypatc
         ({"set": ("windows=0",), "vary": ("windows=[0]",)}, InvalidArgumentError, "got windows"),
         ({"engine": "gpu"}, UnknownNameError, "unknown engine 'gpu'; valid choices: mujoco, twin"),
         ({"workers": 2, "scheduler": "tcp://x:1"}, InvalidArgumentError, "none beside a scheduler"),
-        ({"seeds": 0}, InvalidArgumentError, "seeds: expected an integer >= 1"),
+        ({"seeds": 0}, InvalidArgumentError, "seeds: expected an integer in [1, 1000000]"),
     ],
 )
 def test_a_wrong_search_is_refused_before_it_starts(changes, error, text):

@@ -3,6 +3,7 @@
 import os
 import signal
 import threading
+import time
 
 import psutil
 import pytest
@@ -152,6 +153,15 @@ def test_scores():
     assert Score("*/orbit_error", 0.05, maximise=True).of(outcome) == min(errors)
     with pytest.raises(UnknownNameError, match=r"lissajous/orbit_error"):
         Score("*/orbit", 0.05).of(outcome)
+
+
+@pytest.mark.parametrize("address", ["nowhere", "", "tcp://", "tcp://127.0.0.1:99999"])
+def test_what_is_no_scheduler_s_address_is_refused_at_once(address):
+    pytest.importorskip("distributed")
+    began = time.monotonic()
+    with pytest.raises(InvalidArgumentError, match="the address of a Dask scheduler"):
+        Cluster(address)
+    assert time.monotonic() - began < 5.0
 
 
 def test_no_scheduler_there():

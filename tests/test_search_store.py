@@ -16,7 +16,7 @@ from pathlib import Path
 import pytest
 from searches import SET, tiny_trials
 
-from mcmj.errors import InvalidArgumentError, OutputError, StoreError
+from mcmj.errors import InvalidArgumentError, McmjError, OutputError, StoreError
 from mcmj.search import database
 from mcmj.search.database import TrialStore
 from mcmj.search.experiment import Outcome, Trial, evaluate, make_config
@@ -116,6 +116,37 @@ def test_the_claims_of_a_killed_process_are_void_at_once(tmp_path):
         assert store.claim(["a"]) == {"a"}
 
 
+def test_a_claim_dated_far_ahead_is_void(tmp_path, monkeypatch):
+    with TrialStore(tmp_path / "s") as one, TrialStore(tmp_path / "s") as two:
+        monkeypatch.setattr(database, "LEASE", 1e9)
+        one.claim(["a"])
+        monkeypatch.undo()
+        assert two.claim(["a"]) == {"a"}
+
+
+@pytest.mark.parametrize("way", ["deleted", "replaced"])
+def test_a_store_gone_in_mid_run_is_noticed_at_the_next_write(tmp_path, way):
+    path = tmp_path / "a.sqlite"
+    filled(tmp_path / "other.sqlite", 1)
+    with TrialStore(path) as store:
+        store.add(tiny_trials(1)[0], outcome())
+        if way == "deleted":
+            path.unlink()
+        else:
+            (tmp_path / "other.sqlite").replace(path)
+        for write in (store.renew, lambda: store.claim(["a"])):
+            with pytest.raises(OutputError, match="deleted or replaced while it was in use"):
+                write()
+
+
+def test_outcomes_of_other_versions_are_refused(tmp_path):
+    trials = tiny_trials(1)
+    with TrialStore(tmp_path / "a.sqlite") as store:
+        store.add(trials[0], outcome(versions={"numpy": "0.1"}))
+        with pytest.raises(McmjError, match=r"a\.sqlite: a trial kept there has numpy 0\.1"):
+            run_trials(trials, store, Inline())
+
+
 # --- files that are not what they should be --------------------------------------------------
 
 
@@ -126,9 +157,30 @@ def test_a_store_of_another_schema_is_refused_and_left_alone(tmp_path):
     db.execute("PRAGMA user_version = 7")
     db.close()
     before = path.read_bytes()
-    with pytest.raises(StoreError, match="a store of schema version 7, this mcmj has version 1"):
+    with pytest.raises(StoreError, match="a store of schema version 7, this mcmj has version 2"):
         TrialStore(path)
     assert path.read_bytes() == before
+
+
+@pytest.mark.parametrize(
+    ("column", "value"),
+    [("metrics", "{"), ("metrics", "[]"), ("metrics", b"\xff"), ("versions", "null"),
+     ("status", "fine"), ("seconds", "long"), ("metrics", "[" * 100_000)],
+)  # fmt: skip
+def test_a_damaged_row_is_named(tmp_path, column, value):
+    path = tmp_path / "a.sqlite"
+    (trial,) = filled(path, 1)
+    db = sqlite3.connect(path)
+    db.execute(f"UPDATE trials SET {column} = ?", [value])
+    db.commit()
+    db.close()
+    with TrialStore(path) as store:
+        with pytest.raises(StoreError, match=f"the row of trial {trial.key} is damaged") as caught:
+            store.outcomes([trial.key])
+        assert "\n" not in str(caught.value)
+        if column not in ("status", "seconds"):
+            with pytest.raises(StoreError, match="is damaged"):
+                list(store.rows())
 
 
 def test_another_program_s_database_is_refused_and_left_alone(tmp_path):

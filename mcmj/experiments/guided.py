@@ -12,7 +12,7 @@ from mcmj.search.database import TrialStore
 from mcmj.search.experiment import Score, Trial, default_score, make_config
 from mcmj.search.overrides import override, parse_assignment, value_at
 from mcmj.search.runner import run_trials
-from mcmj.search.space import Space, parse_dimension
+from mcmj.search.space import MAX_SEED, MAX_TRIALS, Space, parse_dimension
 from mcmj.search.study import Study
 from mcmj.search.workers import Workers, open_workers
 from mcmj.store import plain
@@ -86,16 +86,16 @@ class Config:
 
     def __post_init__(self) -> None:
         for name in ("settings", "bodies", "judged"):
-            require_count(name, getattr(self, name), 1)
+            require_count(name, getattr(self, name), 1, MAX_TRIALS)
         for name in ("startup", "first_seed", "judged_from", "draw_seed"):
-            require_count(name, getattr(self, name), 0)
+            require_count(name, getattr(self, name), 0, MAX_SEED - MAX_TRIALS)
         if self.confirm is not None:
             require_count("confirm", self.confirm, 0)
         require_number("threshold", self.threshold, -np.inf)
         if self.objective not in OBJECTIVES:
             raise UnknownNameError("objective", self.objective, OBJECTIVES)
         seen = range(self.first_seed, self.first_seed + self.bodies)
-        if set(seen) & set(self._judged_seeds):
+        if max(seen[0], self.judged_from) <= min(seen[-1], self._judged_seeds[-1]):
             raise InvalidArgumentError("judged_from", "seeds that the search does not use", seen)
         for path in self.space:
             value_at(self.hand_chosen, path)

@@ -8,7 +8,7 @@ import numpy as np
 from mcmj.errors import InvalidArgumentError
 from mcmj.search.experiment import Score, Trial, default_score, make_config
 from mcmj.search.overrides import override, parse_assignment
-from mcmj.search.space import Space, expand, parse_dimension
+from mcmj.search.space import MAX_SEED, MAX_TRIALS, Space, expand, parse_dimension
 from mcmj.validation import require_count, require_number
 
 
@@ -61,9 +61,10 @@ class Config:
     store: Path | None = None
 
     def __post_init__(self) -> None:
-        for name in ("seeds", "draws"):
-            require_count(name, getattr(self, name), 1)
-        for name in ("first_seed", "draw_seed", "confirm", "audit", "best", "cost_trials"):
+        require_count("draws", self.draws, 1, MAX_TRIALS)
+        require_count("seeds", self.seeds, 1, MAX_TRIALS)
+        require_count("first_seed", self.first_seed, 0, MAX_SEED - self.seeds)
+        for name in ("draw_seed", "confirm", "audit", "best", "cost_trials"):
             require_count(name, getattr(self, name), 0)
         require_number("threshold", self.threshold, -np.inf)
         if self.workers is not None:
@@ -99,8 +100,10 @@ class Config:
     @property
     def trials(self) -> list[Trial]:
         """All trials of the screening: every setting with every seed, seeds innermost."""
-        found = []
-        for setting in self.settings:
+        found, settings = [], self.settings
+        if (total := len(settings) * self.seeds) > MAX_TRIALS:
+            raise InvalidArgumentError("seeds, vary", f"at most {MAX_TRIALS} trials", total)
+        for setting in settings:
             one = make_config(self.experiment, {**self.fixed, **setting})
             if hasattr(one, "engine") and "engine" not in self.fixed:
                 one = override(one, {"engine": self.engine})

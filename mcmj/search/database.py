@@ -17,11 +17,11 @@ from pathlib import Path
 from typing import Any
 
 from mcmj.errors import InvalidArgumentError, OutputError, StoreError
-from mcmj.search.experiment import Outcome, Trial
+from mcmj.search.experiment import DIVERGED, DONE, Outcome, Trial
 from mcmj.store import plain
 
 APPLICATION = 0x6D636D6A  # "mcmj", in the file's header
-SCHEMA = 1
+SCHEMA = 2  # 2: keys know the experiment's code, the body file and MuJoCo's version
 LEASE = 60.0  # s: a claim that was not renewed for so long is void
 _PATIENCE = 60.0  # s to wait for another process's write
 _RETRY = 0.01  # s between tries where SQLite does not wait
@@ -58,11 +58,13 @@ class TrialStore:
         if not create and not self.path.is_file():
             raise InvalidArgumentError("store", "an existing file", self.path)
         self._owner = _own_name()
+        self._file: tuple[int, int] | None = None  # while it is being opened
         with self._translated():
             self._db = sqlite3.connect(self.path, timeout=_PATIENCE, isolation_level=None)
         try:
             with self._translated():
                 self._open()
+            self._file = _identity(self.path)
         except BaseException:
             self._db.close()
             raise
@@ -84,7 +86,11 @@ class TrialStore:
             return int(self._db.execute("SELECT count(*) FROM trials").fetchone()[0])
 
     def outcomes(self, keys: Sequence[str]) -> dict[str, Outcome]:
-        """Outcomes of those trials that are finished, by key."""
+        """Outcomes of those trials that are finished, by key.
+
+        Raises:
+            StoreError: a damaged row.
+        """
         found: dict[str, Outcome] = {}
         with self._translated():
             for some in _batches(keys):
@@ -94,9 +100,10 @@ class TrialStore:
                     some,
                 )
                 for key, status, metrics, message, seconds, versions in rows:
-                    found[key] = Outcome(
-                        status, json.loads(metrics), message, seconds, json.loads(versions)
-                    )
+                    if status not in (DONE, DIVERGED) or not isinstance(seconds, float):
+                        raise self._damaged(key, f"status {status!r}, seconds {seconds!r}")
+                    metrics, versions = self._decoded(key, metrics, versions)
+                    found[key] = Outcome(status, metrics, message, seconds, versions)
         return found
 
     def claim(self, keys: Sequence[str]) -> set[str]:
@@ -139,15 +146,35 @@ class TrialStore:
             self._db.execute("DELETE FROM claims WHERE key = ?", [trial.key])
 
     def rows(self) -> Iterator[dict[str, Any]]:
-        """All trials, JSON decoded, in the order of their keys."""
+        """All trials, JSON decoded, in the order of their keys.
+
+        Raises:
+            StoreError: a damaged row.
+        """
         with self._translated():
             cursor = self._db.execute("SELECT * FROM trials ORDER BY key")
             names = [column[0] for column in cursor.description]
             for values in cursor:
                 row = dict(zip(names, values, strict=True))
-                yield row | {n: json.loads(row[n]) for n in ("config", "versions", "metrics")}
+                documents = [row[name] for name in _DOCUMENTS]
+                yield row | dict(
+                    zip(_DOCUMENTS, self._decoded(row["key"], *documents), strict=True)
+                )
 
     # --- inside ------------------------------------------------------------------------------
+
+    def _decoded(self, key: str, *texts: object) -> list[dict[str, Any]]:
+        try:
+            found = [json.loads(text) for text in texts]  # type: ignore[arg-type]
+        except (TypeError, ValueError, RecursionError) as error:
+            raise self._damaged(key, error) from error
+        for document in found:
+            if not isinstance(document, dict):
+                raise self._damaged(key, f"{document!r:.60} is no JSON object")
+        return found
+
+    def _damaged(self, key: str, fault: object) -> StoreError:
+        return StoreError(f"{self.path}: the row of trial {key} is damaged ({fault}); {_RESCUE}")
 
     def _open(self) -> None:
         self._db.execute(f"PRAGMA busy_timeout = {round(1e3 * _PATIENCE)}")
@@ -203,6 +230,11 @@ class TrialStore:
         with self._translated():
             self._db.execute("BEGIN IMMEDIATE")
             try:
+                if self._file not in (None, _identity(self.path)):
+                    raise OutputError(
+                        f"{self.path}: deleted or replaced while it was in use; trials that "
+                        "finished since are lost: put it back, or run the same command again"
+                    )
                 yield
                 self._db.execute("COMMIT")
             except BaseException:
@@ -219,6 +251,7 @@ class TrialStore:
             raise _as_ours(self.path, error) from error
 
 
+_DOCUMENTS = ("config", "versions", "metrics")
 _RESCUE = (
     "nothing was changed; `sqlite3 FILE .recover` may save its trials, or start with another file"
 )
@@ -239,6 +272,15 @@ def _as_ours(path: Path, error: sqlite3.Error) -> StoreError | OutputError:
     return OutputError(f"{path}: {_REASONS.get(code, 'SQLite failed')} ({error})")
 
 
+def _identity(path: Path) -> tuple[int, int] | None:
+    """What tells a file from another one of its name."""
+    try:
+        found = path.stat()
+    except OSError:
+        return None
+    return found.st_dev, found.st_ino
+
+
 def _text(value: object) -> str:
     return json.dumps(value, sort_keys=True, allow_nan=False)
 
@@ -256,7 +298,9 @@ def _own_name() -> str:
 
 def _alive(owner: str, until: float) -> bool:
     """Whether a claim holds: renewed in time, and its process not seen to be dead."""
-    if until < time.time():
+    if not time.time() <= until <= time.time() + 2 * LEASE:  # far ahead: a wrong clock, or damage
+        return False
+    if owner.count("/") != 4:  # written by no store
         return False
     host, space, process, born, _ = owner.split("/")
     if (host, space) != (socket.gethostname(), _process_space()) or not born:

@@ -21,7 +21,8 @@ import pkgutil
 import time
 import warnings
 from collections.abc import Mapping
-from importlib.metadata import version
+from contextlib import suppress
+from pathlib import Path
 from types import ModuleType
 from typing import Any
 
@@ -35,6 +36,7 @@ from mcmj.errors import (
     UnknownNameError,
 )
 from mcmj.generator import draw_body
+from mcmj.library import body_path
 from mcmj.metricpath import matched, numbers_at, quantity
 from mcmj.mjcf import to_mjcf
 from mcmj.options import DEFAULT_INTEGRATOR
@@ -53,7 +55,9 @@ def load_experiment(name: str) -> ModuleType:
         UnknownNameError: no such module.
         InvalidArgumentError: a module that is no experiment.
     """
-    full = name if "." in name else f"{PACKAGE}.{name}"
+    full = _full_name(name)
+    if not all(part.isidentifier() for part in full.split(".")):
+        raise UnknownNameError("experiment", name, _experiments())
     try:
         module = importlib.import_module(full)
     except ModuleNotFoundError as error:
@@ -90,9 +94,22 @@ class Trial:
 
     @functools.cached_property
     def key(self) -> str:
-        """Of its place in a store: a hash of experiment, config and version of mcmj."""
-        account = [self.experiment, plain(self.config), _version()]
+        """Of its place in a store: a hash of experiment, config, inputs, and the versions of
+        mcmj and MuJoCo."""
+        here = versions()
+        account = [self.experiment, plain(self.config), self.inputs, here["mcmj"], here["mujoco"]]
         return hashlib.sha256(json.dumps(account, sort_keys=True).encode()).hexdigest()
+
+    @functools.cached_property
+    def inputs(self) -> str:
+        """A hash of what the run reads besides: the code of an experiment of one's own (all of
+        its package), the config's body file, and files that it names as a Path."""
+        digest = hashlib.sha256(_source_digest(self.experiment).encode())
+        for name, value in vars(self.config).items():
+            if isinstance(value, Path) or (name == "body" and isinstance(value, str)):
+                with suppress(McmjError, OSError):  # what cannot be read, the run refuses
+                    digest.update(name.encode() + body_path(str(value)).read_bytes())
+        return digest.hexdigest()
 
 
 @dataclasses.dataclass(frozen=True)
@@ -118,8 +135,14 @@ def evaluate(trial: Trial) -> Outcome:
     """Run a trial, with one BLAS thread; a simulation that blows up is an outcome.
 
     Raises:
-        McmjError: an experiment that cannot run under this config.
+        McmjError: an experiment that cannot run under this config; code or a body file that is
+            not what the search began with.
     """
+    if Trial(trial.experiment, trial.config).inputs != trial.inputs:
+        raise McmjError(
+            f"the code of {trial.experiment}, or the body file, is not what the search began with "
+            "(edited meanwhile, or other files on this worker); run the same command again"
+        )
     module = load_experiment(trial.experiment)
     status, message = DONE, ""
     metrics: Any = {}
@@ -215,8 +238,11 @@ class Score:
         return -score if self.maximise else score
 
 
-def check_versions(outcome: Outcome) -> None:
+def check_versions(outcome: Outcome, where: str = "a worker") -> None:
     """Check that a trial ran on what this machine has too: else its bits may differ.
+
+    Args:
+        where: it ran or is kept, for the error.
 
     Raises:
         McmjError: another version of a package.
@@ -226,14 +252,26 @@ def check_versions(outcome: Outcome) -> None:
     if other:
         name, there = next(iter(other.items()))
         raise McmjError(
-            f"a worker has {name} {there}, this machine {here.get(name)}: install the same "
+            f"{where} has {name} {there}, this machine {here.get(name)}: install the same "
             "versions everywhere, or results depend on where a trial runs"
         )
 
 
-@functools.cache
-def _version() -> str:
-    return version("mcmj")
+def _full_name(name: str) -> str:
+    return name if "." in name else f"{PACKAGE}.{name}"
+
+
+@functools.cache  # once a process, as Python loads code once
+def _source_digest(name: str) -> str:
+    """Of all source files of the package that an experiment of one's own belongs to."""
+    package = _full_name(name).partition(".")[0]
+    if package == "mcmj":  # its version stands for it
+        return ""
+    digest = hashlib.sha256()
+    for folder in map(Path, importlib.import_module(package).__path__):
+        for path in sorted(folder.rglob("*.py")):
+            digest.update(str(path.relative_to(folder)).encode() + b"\0" + path.read_bytes())
+    return digest.hexdigest()
 
 
 def _experiments() -> list[str]:

@@ -143,6 +143,7 @@ class _Runner:
 
     def _take_finished(self, keys: list[str]) -> None:
         for key, outcome in self._store.outcomes(keys).items():
+            check_versions(outcome, f"{self._store.path}: a trial kept there")
             self._tell(key, outcome)
         found = self._result.outcomes
         self._waiting = deque(key for key in self._waiting if key not in found)

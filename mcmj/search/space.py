@@ -2,6 +2,7 @@
 
 import itertools
 import json
+import math
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -12,6 +13,8 @@ from mcmj.errors import InvalidArgumentError
 from mcmj.streams import stream
 from mcmj.validation import require_count, require_number
 
+MAX_TRIALS = 1_000_000  # of one search: each is built before the first runs
+MAX_SEED = 2**63 - 1  # what a store can hold
 KINDS = ("uniform", "log", "int")
 _RANGE = re.compile(rf"({'|'.join(KINDS)})\s*\((.*)\)")
 _FORMS = "[a, b, ..], uniform(low, high), log(low, high), int(low, high), or with a count: a grid"
@@ -63,7 +66,7 @@ class Range:
 
     def grid(self, count: int) -> Choices:
         """`count` equally spaced values, ends included."""
-        require_count("count", count, 1)
+        require_count("count of a grid", count, 1, MAX_TRIALS)
         if self.kind == "int":
             steps = np.linspace(self.low, self.high, count)
             return Choices(tuple(dict.fromkeys(round(float(x)) for x in steps)))
@@ -105,11 +108,14 @@ def expand(space: Space, draws: int, seed: int) -> list[dict[str, object]]:
     of the rest; without a range there is one draw.
 
     Raises:
-        InvalidArgumentError: draws below 1.
+        InvalidArgumentError: draws below 1, or more than MAX_TRIALS settings.
     """
-    require_count("draws", draws, 1)
+    require_count("draws", draws, 1, MAX_TRIALS)
     ranges = {path: part for path, part in space.items() if isinstance(part, Range)}
     lists = {path: part.values for path, part in space.items() if isinstance(part, Choices)}
+    total = math.prod(map(len, lists.values())) * (draws if ranges else 1)
+    if total > MAX_TRIALS:
+        raise InvalidArgumentError("vary", f"at most {MAX_TRIALS} settings", total)
     drawn = _draw(ranges, draws if ranges else 1, seed)
     return [
         {path: {**dict(zip(lists, values, strict=True)), **random}[path] for path in space}

@@ -2,7 +2,9 @@
 
 import multiprocessing
 import os
+import re
 import signal
+import socket
 import threading
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future, ProcessPoolExecutor
@@ -109,6 +111,7 @@ class Cluster:
             from distributed import Client, KilledWorker
         except ImportError:
             raise McmjError("a cluster needs Dask: pip install 'mcmj[cluster]'") from None
+        _check_answers(scheduler)
         try:
             self._client = Client(scheduler, timeout=patience, set_as_default=False)
             self._client.wait_for_workers(1, timeout=patience)
@@ -136,6 +139,20 @@ class Cluster:
         """Cancel what is not done, and leave the cluster as it was."""
         self._pool.shutdown(wait=False)
         self._client.close()
+
+
+def _check_answers(scheduler: str, *, patience: float = 5.0) -> None:
+    """Dask itself waits for long, and says little, where nobody listens."""
+    expected = "the address of a Dask scheduler, as in tcp://host:8786"
+    match = re.fullmatch(r"(?:([a-z]+)://)?\[?([^/\[\]]+)\]?:(\d{1,5})", scheduler)
+    if match is None:
+        raise InvalidArgumentError("scheduler", expected, repr(scheduler))
+    if match[1] not in (None, "tcp", "tls"):
+        return
+    try:
+        socket.create_connection((match[2], int(match[3])), timeout=patience).close()
+    except (OSError, OverflowError, UnicodeError) as error:
+        raise InvalidArgumentError("scheduler", expected, f"{scheduler}: {error}") from error
 
 
 @contextmanager
