@@ -8,12 +8,14 @@ import mujoco
 import numpy as np
 
 from mcmj.body import Body
+from mcmj.bodyscan import MAX_BYTES, read_body_file, scan
 from mcmj.errors import BodyFileError, InvalidArgumentError
 from mcmj.memory import COUPLED_TAG, TAG
 from mcmj.mjcf import READOUT_PREFIX
+from mcmj.quiet import quiet_warnings
 from mcmj.validation import Array
 
-_JOINT = re.compile(r"n(\d+)x")
+_JOINT = re.compile(r"n([0-9]{1,9})x")
 
 
 def from_mjcf(xml_or_path: str | Path) -> tuple[Body, Array | None]:
@@ -26,30 +28,27 @@ def from_mjcf(xml_or_path: str | Path) -> tuple[Body, Array | None]:
     return body_of_model(model), readout_of_model(model)
 
 
-def load_model(xml_or_path: str | Path) -> mujoco.MjModel:
+def load_model(xml_or_path: str | Path, max_bytes: int = MAX_BYTES) -> mujoco.MjModel:
     """Compile MJCF text (anything that starts with "<") or a file.
 
+    The text is scanned first: it may not read other files, repeat elements, or be or allocate
+    more than `max_bytes`.
+
     Raises:
-        BodyFileError: no such file, or MuJoCo cannot compile it.
+        BodyFileError: no such file, refused by the scan, or MuJoCo cannot compile it.
     """
     text = str(xml_or_path)
     inline = text.lstrip().startswith("<")
-    if not inline and not _is_file(text):
-        raise BodyFileError(f"no such body file: {text[:200]}")
+    source = "MJCF text" if inline else text[:200]
+    if not inline:
+        text = read_body_file(text, max_bytes)
+    scan(text, source, max_bytes)
     try:
-        if inline:
+        with quiet_warnings():
             return mujoco.MjModel.from_xml_string(text)
-        return mujoco.MjModel.from_xml_path(text)
-    except ValueError as error:
-        source = "MJCF text" if inline else text
-        raise BodyFileError(f"{source}: MuJoCo cannot compile it: {error}") from error
-
-
-def _is_file(path: str) -> bool:
-    try:
-        return Path(path).is_file()
-    except (OSError, ValueError):  # too long for a name, or with a null
-        return False
+    except (ValueError, mujoco.FatalError) as error:
+        reason = " ".join(str(error).split())
+        raise BodyFileError(f"{source}: MuJoCo cannot compile it: {reason}") from error
 
 
 def body_of_model(model: mujoco.MjModel) -> Body:
@@ -114,9 +113,21 @@ def readouts_of_model(model: mujoco.MjModel) -> dict[str, Array]:
 
 
 def provenance_of_model(model: mujoco.MjModel) -> dict[str, object] | None:
-    """The account that `to_mjcf` stored of where the body comes from."""
+    """The account that `to_mjcf` stored of where the body comes from.
+
+    Raises:
+        BodyFileError: it is not a JSON object.
+    """
     text = _text(model, "provenance")
-    return None if text is None else json.loads(text)
+    if text is None:
+        return None
+    try:
+        account = json.loads(text)
+    except (ValueError, RecursionError) as error:
+        raise BodyFileError(f"provenance: expected JSON ({error})") from error
+    if not isinstance(account, dict):
+        raise BodyFileError(f"provenance: expected a JSON object, got {text[:40]!r}")
+    return account
 
 
 def spring_law_of_model(model: mujoco.MjModel) -> str:
@@ -178,6 +189,8 @@ def _weights(model: mujoco.MjModel, prefix: str, fixed: np.ndarray) -> Array:
             joint = _JOINT.fullmatch(model.joint(model.wrap_objid[wrap]).name)
             if model.wrap_type[wrap] != mujoco.mjtWrap.mjWRAP_JOINT or joint is None:
                 raise BodyFileError(f"tendon {prefix}{c} does not push nodes horizontally")
+            if int(joint[1]) >= len(fixed):
+                raise BodyFileError(f"tendon {prefix}{c} pushes a node that is not there")
             weights[int(joint[1]), c] = model.wrap_prm[wrap]
     stored = _stored(model, f"fixed_w_{prefix}")
     if stored is not None:

@@ -94,6 +94,8 @@ def load_trajectory(path: str | Path) -> StoredRun:
         trajectory, xml, account = read_zarr(final)
     else:
         trajectory, xml, account = _read_npz(final)
+    if xml is not None and not xml.lstrip().startswith("<"):  # a path would be read
+        raise TrajectoryFileError(f"{final}: expected a body in MJCF, got {xml[:40]!r}")
     body, w_out = (None, None) if xml is None else from_mjcf(xml)
     return StoredRun(trajectory, body, w_out, account)
 
