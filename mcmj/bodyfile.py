@@ -15,6 +15,7 @@ from mcmj.mjcf import READOUT_PREFIX
 from mcmj.quiet import quiet_warnings
 from mcmj.validation import Array
 
+LARGEST = 1e60  # of any number of a body
 _JOINT = re.compile(r"n([0-9]{1,9})x")
 
 
@@ -71,7 +72,7 @@ def body_of_model(model: mujoco.MjModel) -> Body:
     if (stored := _stored(model, "fixed_masses")) is not None:
         masses[fixed] = _shaped(stored, (int(fixed.sum()),), "fixed_masses")
     try:
-        return Body(
+        body = Body(
             positions=positions[:, :2],
             springs=_spring_ends(model, springs, nodes),
             fixed=fixed,
@@ -82,6 +83,18 @@ def body_of_model(model: mujoco.MjModel) -> Body:
         )
     except InvalidArgumentError as error:
         raise BodyFileError(f"not a valid mcmj body: {error}") from error
+    _require_moderate(body)
+    return body
+
+
+def _require_moderate(body: Body) -> None:
+    """Quotients such as k / m of what is read stay finite."""
+    for name in ("positions", "rest_lengths", "masses", "k1", "k3", "d1", "d3", "w_in", "w_fb"):
+        size = np.abs(getattr(body, name)).max(initial=0.0)
+        if size > LARGEST:
+            raise BodyFileError(f"{name}: expected at most {LARGEST:g} in size, got {size:g}")
+    if (least := body.masses.min()) < 1 / LARGEST:
+        raise BodyFileError(f"masses: expected at least {1 / LARGEST:g}, got {least:g}")
 
 
 def readout_of_model(model: mujoco.MjModel) -> Array | None:
