@@ -8,6 +8,7 @@ import mujoco
 import numpy as np
 
 from mcmj.body import Body
+from mcmj.bodycheck import require_only_a_body
 from mcmj.bodyscan import MAX_BYTES, read_body_file, scan
 from mcmj.errors import BodyFileError, InvalidArgumentError
 from mcmj.memory import COUPLED_TAG, TAG
@@ -84,6 +85,8 @@ def body_of_model(model: mujoco.MjModel) -> Body:
     except InvalidArgumentError as error:
         raise BodyFileError(f"not a valid mcmj body: {error}") from error
     _require_moderate(body)
+    channels = body.n_inputs + body.n_outputs
+    require_only_a_body(model, len(body.free), len(springs) + channels, channels)
     return body
 
 

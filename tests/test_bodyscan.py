@@ -84,3 +84,28 @@ def test_numbers_out_of_range_leave_one_line_and_no_log(name, value, tmp_path, m
     with suppress(BodyFileError):  # nothing else: no warning of NumPy's, no raw error
         mcmj.from_mjcf(text)
     assert not list(tmp_path.iterdir())
+
+
+OPTION = 'gravity="0 0 0"'
+UNSAID = {
+    "gravity": (OPTION, 'gravity="0 0 -9.81"'),
+    "wind": (OPTION, OPTION + ' wind="1 0 0"'),
+    "viscosity": (OPTION, OPTION + ' viscosity="1"'),
+    "dof_damping": ('axis="1 0 0"', 'axis="1 0 0" damping="1"'),
+    "jnt_stiffness": ('axis="1 0 0"', 'axis="1 0 0" stiffness="1"'),
+    "jnt_limited": ('axis="1 0 0"', 'axis="1 0 0" limited="true" range="-1 1"'),
+    "joint that is not": ('type="slide" axis="1 0 0"', 'type="hinge" axis="0 0 1"'),
+    "geom_contype": ("</worldbody>", '<geom type="sphere" size="1"/></worldbody>'),
+    "nbody": ("</worldbody>", '<body><inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/></body></worldbody>'),
+    "gear": ("<motor ", '<motor gear="2" '),
+    "nu": ("</actuator>", '<motor name="more" tendon="s0"/></actuator>'),
+    "z = 0": (' 0.0">', ' 1.0">'),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", UNSAID)
+def test_what_a_body_cannot_say_is_refused_by_name(name):
+    old, new = UNSAID[name]
+    text = mcmj.to_mjcf(mcmj.random_body(0, 5, n_inputs=1)).replace(old, new, 1)
+    with pytest.raises(BodyFileError, match=name):
+        mcmj.from_mjcf(text)
