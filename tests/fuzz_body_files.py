@@ -62,7 +62,7 @@ def batch(seed: int) -> None:
         how = {"integrator": "leapfrog"} if law == "leapfrog" else {"springs": law}
         with np.errstate(all="ignore"):
             try:
-                read, w_out = mcmj.from_mjcf(mutated(mcmj.to_mjcf(body, **how), rng))
+                read, _w_out = mcmj.from_mjcf(mutated(mcmj.to_mjcf(body, **how), rng))
                 mcmj.Simulation(read, timestep=1e-3, **how).rollout(5)
             except McmjError as error:
                 if "\n" in str(error):

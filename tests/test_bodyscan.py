@@ -96,7 +96,7 @@ UNSAID = {
     "jnt_limited": ('axis="1 0 0"', 'axis="1 0 0" limited="true" range="-1 1"'),
     "joint that is not": ('type="slide" axis="1 0 0"', 'type="hinge" axis="0 0 1"'),
     "geom_contype": ("</worldbody>", '<geom type="sphere" size="1"/></worldbody>'),
-    "nbody": ("</worldbody>", '<body><inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/></body></worldbody>'),
+    "nbody": ("</worldbody>", "<body/></worldbody>"),
     "gear": ("<motor ", '<motor gear="2" '),
     "nu": ("</actuator>", '<motor name="more" tendon="s0"/></actuator>'),
     "z = 0": (' 0.0">', ' 1.0">'),

@@ -77,6 +77,7 @@ CHAINS = (
 )
 MUJOCO = {
     "alteration",
+    "bodycheck",
     "bodyfile",
     "engine",
     "experiments.benchmark",
