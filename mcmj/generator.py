@@ -13,6 +13,7 @@ from mcmj.streams import stream
 from mcmj.validation import Array, as_array, require_count, require_number, require_range
 
 Range = tuple[float, float]
+MOST_NODES, MOST_CHANNELS = 100_000, 1000  # more would fill the memory before anything runs
 
 
 @dataclass(frozen=True)
@@ -58,9 +59,9 @@ class BodySettings:
     feedback_scale: float = 10.0
 
     def __post_init__(self) -> None:
-        require_count("nodes", self.nodes, 3)
-        require_count("n_inputs", self.n_inputs, 0)
-        require_count("n_outputs", self.n_outputs, 0)
+        require_count("nodes", self.nodes, 3, MOST_NODES)
+        require_count("n_inputs", self.n_inputs, 0, MOST_CHANNELS)
+        require_count("n_outputs", self.n_outputs, 0, MOST_CHANNELS)
         for name in ("width", "height", "input_scale", "feedback_scale"):
             require_number(name, getattr(self, name), 0.0, open_low=True)
         for name in ("input_fraction", "feedback_fraction"):

@@ -47,7 +47,7 @@ class Teaching:
         require_washout(self.washout, self.duration)
         for name in ("noise", "length_noise", "ridge_per_row"):
             require_number(name, getattr(self, name), 0.0)
-        require_count("every", self.every, 1)
+        require_count("every", self.every, 1, 1000)
         require_count("rest_runs", self.rest_runs, 0)
         for name in ("rest_duration", "rest_weight"):
             require_number(name, getattr(self, name), 0.0, open_low=True)

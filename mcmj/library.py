@@ -19,6 +19,8 @@ def body_path(name: str) -> Path:
     Raises:
         UnknownNameError: neither.
     """
+    if not name or Path(name).is_dir():
+        raise UnknownNameError("body", name, [*body_names(), "a path to an .xml file"])
     given = Path(name)
     if given.suffix == ".xml" or given.exists():
         return given

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 from mcmj.errors import InvalidArgumentError, UnknownNameError
 from mcmj.spring_laws import NATIVE, SpringLaw
-from mcmj.validation import require_count, require_number
+from mcmj.validation import require_count, require_timestep
 
 ENGINES = ("mujoco", "twin")
 DEFAULT_INTEGRATOR = "Euler"
@@ -26,7 +26,7 @@ class Options:
     engine: str = "mujoco"
 
     def __post_init__(self) -> None:
-        require_number("timestep", self.timestep, 0.0, open_low=True)
+        require_timestep("timestep", self.timestep)
         require_count("feedback_delay", self.feedback_delay, 0)
         require_count("substeps", self.substeps, 1)
         if self.engine not in ENGINES:

@@ -263,6 +263,8 @@ class Simulation:
 def _with_hook(drive: Drive, hook: Hook, step: int, simulation: Simulation) -> Drive:
     """The drive with the hook's forces for this one step added."""
     lengths = simulation._public(simulation._engine.current_lengths())
+    if not callable(hook):
+        raise InvalidArgumentError("hook", "a function (time, lengths) -> forces", repr(hook))
     pushed = hook(simulation.time, lengths)
     forces = as_array("hook's forces", pushed, (simulation.body.n_nodes,))[None]
     if drive.forces is not None:

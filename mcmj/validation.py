@@ -7,6 +7,7 @@ import numpy.typing as npt
 
 from mcmj.errors import InvalidArgumentError, UnknownNameError
 
+SHORTEST_STEP = 1e-9  # s: below, rounding of the state exceeds what a step changes
 Array = npt.NDArray[np.float64]
 
 
@@ -67,6 +68,11 @@ def require_number(
     if not inside:
         left = "(" if open_low else "["
         raise InvalidArgumentError(name, f"a number in {left}{low:g}, {high:g}]", value)
+
+
+def require_timestep(name: str, value: float) -> None:
+    """Raise unless value is a step of at least SHORTEST_STEP [s]."""
+    require_number(name, value, SHORTEST_STEP)
 
 
 def require_count(name: str, value: int, low: int, high: int | None = None) -> None:

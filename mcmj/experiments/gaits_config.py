@@ -12,7 +12,7 @@ from mcmj.generator import BodySettings, draw_body
 from mcmj.lessons import Teaching
 from mcmj.library import body_path
 from mcmj.practice import Practice
-from mcmj.validation import Array, require_count, require_number
+from mcmj.validation import Array, require_count, require_number, require_timestep
 
 # the default body with all its motion 1.5 times faster, for a walk's swing is fast: stiffness and
 # forces x 1.5^2, d1 x 1.5, d3 / 1.5; chosen, like the teaching, on bodies of seeds 100 to 119
@@ -76,8 +76,9 @@ class Config:
             require_count("seed", self.seed, 0)
         require_count("seeds", self.seeds, 1)
         require_count("phases", self.phases, 1)
-        for name in ("before", "tolerance", "timestep", "window"):
+        for name in ("before", "tolerance", "window"):
             require_number(name, getattr(self, name), 0.0, open_low=True)
+        require_timestep("timestep", self.timestep)
         for name in ("free_run", "after", "from_rest"):
             require_number(name, getattr(self, name), self.window)
         if self.body is not None and (self.settings != DRAWN or self.seeds > 1):
@@ -101,7 +102,7 @@ def get_body(config: Config, seed: int) -> tuple[Body, dict[str, Array], dict[st
         source: dict[str, object] = {"seed": seed, "settings": asdict(config.settings)}
         body, readouts = draw_body(seed, config.settings), {}
     else:
-        model = load_model(body_path(config.body or "gaits"))
+        model = load_model(body_path("gaits" if config.body is None else config.body))
         body, source = body_of_model(model), provenance_of_model(model) or {}
         stored = readouts_of_model(model)
         readouts = {name: stored[name] for name in config.gaits if name in stored}

@@ -19,7 +19,7 @@ from mcmj.lessons import Teaching
 from mcmj.library import body_path
 from mcmj.practice import Practice
 from mcmj.profiles import Profile, Ramp, hold
-from mcmj.validation import Array, require_count, require_number
+from mcmj.validation import Array, require_count, require_number, require_timestep
 
 SYSTEM = QUADRATIC
 PROFILES = {
@@ -91,8 +91,9 @@ class Config:
         require_count("seed", self.seed, 0)
         require_count("seeds", self.seeds, 1)
         require_count("phases", self.phases, 1)
-        for name in ("free_run", "tolerance", "timestep"):
+        for name in ("free_run", "tolerance"):
             require_number(name, getattr(self, name), 0.0, open_low=True)
+        require_timestep("timestep", self.timestep)
         for name in ("run_in", "sweep"):
             require_number(name, getattr(self, name), 0.0)
         require_number("window", self.window, 0.0, self.free_run, open_low=True)

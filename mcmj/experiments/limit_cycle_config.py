@@ -22,8 +22,8 @@ from mcmj.lessons import Teaching
 from mcmj.library import body_path
 from mcmj.options import DEFAULT_INTEGRATOR, ENGINES
 from mcmj.spring_laws import NATIVE
-from mcmj.targets import TARGETS, Target
-from mcmj.validation import Array, require_number
+from mcmj.targets import TARGETS, Target, target
+from mcmj.validation import Array, require_number, require_timestep
 
 
 @dataclass(frozen=True)
@@ -64,10 +64,12 @@ class Config:
     def __post_init__(self) -> None:
         if self.task not in (*TARGETS, "all"):
             raise UnknownNameError("task", self.task, [*TARGETS, "all"])
-        require_number("timestep", self.timestep, 0.0, open_low=True)
+        require_timestep("timestep", self.timestep)
         require_number("free_run", self.free_run, 0.0, open_low=True)
         require_number("window", self.window, 0.0, self.free_run, open_low=True)
-        require_number("windows", self.windows, 0.0)
+        if self.windows != 0.0:
+            longest = max(target(name).period for name in self.tasks)
+            require_number("windows", self.windows, metrics.PERIODS_NEEDED * longest)
         if self.engine not in ENGINES:
             raise UnknownNameError("engine", self.engine, ENGINES)
         if self.body is not None and self.settings != BodySettings():
@@ -94,7 +96,7 @@ def get_body(config: Config) -> tuple[Body, dict[str, Array], dict[str, object]]
     if config.body is None and (config.seed is not None or config.settings != BodySettings()):
         body = draw_body(config.noise_seed, config.settings)
         return body, {}, {"seed": config.noise_seed, "settings": asdict(config.settings)}
-    model = load_model(body_path(config.body or "general"))
+    model = load_model(body_path("general" if config.body is None else config.body))
     _warn_if_other_physics(config, model)
     body, readouts = body_of_model(model), readouts_of_model(model)
     active = readout_of_model(model)

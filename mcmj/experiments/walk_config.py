@@ -9,7 +9,7 @@ from mcmj.errors import InvalidArgumentError, UnknownNameError
 from mcmj.gaits import GAITS, LEGS
 from mcmj.library import body_path
 from mcmj.quadruped import Quadruped
-from mcmj.validation import Array, require_count, require_names, require_number
+from mcmj.validation import Array, require_count, require_names, require_number, require_timestep
 from mcmj.walker import PUSH_DURATION
 
 PARTS = ("walk", "switch", "push", "adapt", "recover", "steps", "cost")
@@ -77,8 +77,9 @@ class Config:
         require_count("seeds", self.seeds, 1)
         require_count("moments", self.moments, 1)
         require_count("starts", self.starts, 1)
-        for name in ("pace", "timestep", "walking", "before", "after", "survive"):
+        for name in ("pace", "walking", "before", "after", "survive"):
             require_number(name, getattr(self, name), 0.0, open_low=True)
+        require_timestep("timestep", self.timestep)
         require_number("survive", self.survive, 2 * PUSH_DURATION)
         if {"adapt", "recover"} & set(self.parts):
             require_number("after", self.after, SHORTEST / self.pace)
