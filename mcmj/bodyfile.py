@@ -47,10 +47,28 @@ def load_model(xml_or_path: str | Path, max_bytes: int = MAX_BYTES) -> mujoco.Mj
     scan(text, source, max_bytes)
     try:
         with quiet_warnings():
-            return mujoco.MjModel.from_xml_string(text)
+            model = mujoco.MjModel.from_xml_string(text)
     except (ValueError, mujoco.FatalError) as error:
         reason = " ".join(str(error).split())
         raise BodyFileError(f"{source}: MuJoCo cannot compile it: {reason}") from error
+    _require_readouts_inside(model, source)
+    return model
+
+
+def _require_readouts_inside(model: mujoco.MjModel, source: str) -> None:
+    """Every readout reads sensors that exist; the callback ignores one that does not."""
+    ours = np.flatnonzero(
+        (model.actuator_biasprm[:, 1] == TAG) & (model.actuator_biasprm[:, 0] != 0)
+    )
+    for actuator in ours:
+        first, count = model.actuator_biasprm[actuator, 2:4]
+        room = min(model.nuser_actuator, model.nsensordata - first)
+        if not (first >= 0 and 1 <= count <= room):
+            raise BodyFileError(
+                f"{source}: actuator {model.actuator(actuator).name!r}: its readout reads {count:g} "
+                f"numbers from sensor {first:g} on with {model.nuser_actuator} weights, of "
+                f"{model.nsensordata} that exist"
+            )
 
 
 def body_of_model(model: mujoco.MjModel) -> Body:

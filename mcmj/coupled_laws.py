@@ -12,12 +12,13 @@ from typing import Any
 import numba
 from numba import carray, types
 
+from mcmj.lawtable import register
 from mcmj.memory import COUPLED_TAG, doubles
 from mcmj.spring_laws import SpringLaw
 
 CoupledPull = Callable[[Any, Any, Any, Any], None]
 
-_FIRST_PARAMETER = 3  # tendon user data: tag, address, l0, k1, k3, d1, d3
+_FIRST_PARAMETER = 3  # tendon user data: tag, key, l0, k1, k3, d1, d3
 _SIGNATURE = types.void(*[types.int64] * 6)
 
 
@@ -37,6 +38,10 @@ class CoupledLaw(SpringLaw):
     def tag(self) -> float:
         """What marks this kind of law in tendon user data."""
         return COUPLED_TAG
+
+    def key(self, n_springs: int) -> float:
+        """The same for a law that sees all springs: no other number of them calls it."""
+        return register(self._compiled, n_springs)
 
     @functools.cached_property
     def _compiled(self):

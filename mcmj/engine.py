@@ -50,7 +50,7 @@ class Engine:
             feedback_delay=options.feedback_delay * timestep,
             control_period=timestep if substeps > 1 else 0.0,
         )
-        self._law = law = spring_law(options.springs)  # keeps the compiled function alive
+        law = spring_law(options.springs)
         self._callbacks = {"springs": law is not None, "leapfrog": integrator == LEAPFROG}
         laws.install(**self._callbacks)  # first: MuJoCo's compiler calls them too
         self.model = load_model(xml)
@@ -58,7 +58,7 @@ class Engine:
         if substeps > 1:  # the first sample at t = 0: MJCF takes no phase beyond a period
             self.model.sensor_interval[: body.n_springs, 1] -= timestep
         if law is not None:
-            self.model.tendon_user[: body.n_springs, 1] = law.address_as_double
+            self.model.tendon_user[: body.n_springs, 1] = law.key(body.n_springs)
         self._batch = Batch(self.model, copies, threads)
         self._x_dofs = 2 * np.arange(len(body.free))  # joints are n<i>x, n<i>y in node order
         self.steps_done = 0

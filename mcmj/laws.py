@@ -31,9 +31,10 @@ _FAST = {"contract", "reassoc", "nsz", "arcp"}  # NaN and infinity keep their me
 
 def _compile_readout() -> CFunction:
     """The mjcb_act_bias callback. Offsets are closure variables: Numba's cache keys on them."""
-    fields = ("nuser_actuator", "actuator_user", "actuator_biasprm")
+    fields = ("nuser_actuator", "nsensordata", "actuator_user", "actuator_biasprm")
     model_at, data_at = word_offsets("mjModel", fields), word_offsets("mjData", ["sensordata"])
     n_user_at, user_at = model_at["nuser_actuator"], model_at["actuator_user"]
+    n_data_at = model_at["nsensordata"]
     parameters_at, sensors_at = model_at["actuator_biasprm"], data_at["sensordata"]
 
     def readout(model, data, actuator):
@@ -42,12 +43,13 @@ def _compile_readout() -> CFunction:
         gate = parameters[first]
         if parameters[first + 1] != TAG or gate == 0.0:
             return 0.0
-        n_user = model[n_user_at]
-        n_sensors = numba.int64(parameters[first + 3])
+        n_user, start, count = model[n_user_at], parameters[first + 2], parameters[first + 3]
+        inside = 0.0 <= start and 1.0 <= count <= n_user and start + count <= model[n_data_at]
+        if not inside:  # also NaN: a model that mcmj did not write
+            return 0.0
+        n_sensors = numba.int64(count)
         weights = numba.carray(doubles(model[user_at] + 8 * n_user * actuator), n_user)
-        sensors = numba.carray(
-            doubles(data[sensors_at] + 8 * numba.int64(parameters[first + 2])), n_sensors
-        )
+        sensors = numba.carray(doubles(data[sensors_at] + 8 * numba.int64(start)), n_sensors)
         if parameters[first + 4] != 0.0 and sensors[0] == 0.0:
             return 0.0  # a delayed sensor that has nothing to show yet
         output = 0.0

@@ -92,7 +92,8 @@ def runs_leapfrog(model, at):
     first, data = integers(model[at.numeric_adr]), doubles(model[at.numeric_data])
     found = False
     for i in range(model[at.nnumeric]):
-        found |= data[first[i]] == TAG
+        if first[i] < model[at.nnumericdata]:
+            found |= data[first[i]] == TAG
     return found
 
 

@@ -21,6 +21,12 @@ def doubles(typingctx: Any, address: Any) -> Any:
 
 
 @intrinsic
+def integer_words(typingctx: Any, address: Any) -> Any:
+    """A pointer to int64 from an integer address."""
+    return types.CPointer(types.int64)(types.int64), _int_to_pointer(ir.IntType(64))
+
+
+@intrinsic
 def integers(typingctx: Any, address: Any) -> Any:
     """A pointer to int32 from an integer address."""
     return types.CPointer(types.int32)(types.int64), _int_to_pointer(ir.IntType(32))
@@ -34,16 +40,6 @@ def address_of(typingctx: Any, words: Any) -> Any:
         return builder.ptrtoint(args[0], ir.IntType(64))
 
     return types.int64(WORDS), codegen
-
-
-@intrinsic
-def bits(typingctx: Any, number: Any) -> Any:
-    """The 64 bits of a float64 as an integer: tendon user data holds addresses that way."""
-
-    def codegen(context, builder, signature, args):
-        return builder.bitcast(args[0], ir.IntType(64))
-
-    return types.int64(types.float64), codegen
 
 
 @intrinsic

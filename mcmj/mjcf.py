@@ -174,7 +174,7 @@ def _add_springs(tendons: ET.Element, body: Body, law: SpringLaw | None) -> None
                 "springlength": numbers(body.rest_lengths[j]),
             }
         else:
-            # the law's address is filled in at run time; 0 in a file means "not connected"
+            # the law's key is filled in at run time; 0 in a file means "not connected"
             physics = {"user": numbers([law.tag, 0, body.rest_lengths[j], k1, k3, d1, d3])}
         spatial = ET.SubElement(tendons, "spatial", {"name": f"s{j}"} | physics)
         ET.SubElement(spatial, "site", site=f"n{a}")

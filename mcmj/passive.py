@@ -1,8 +1,8 @@
 """MuJoCo's passive force callback: custom spring laws, and what the leapfrog adds.
 
 MuJoCo holds one such callback per process, so one does both, each for the models that ask for
-it, and nothing for others. A tendon with user data [TAG, address of the law, l0, k1, k3, d1,
-d3] is pulled through its sparse Jacobian by
+it, and nothing for others. A tendon with user data [TAG, key of the law (mcmj.lawtable), l0,
+k1, k3, d1, d3] is pulled through its sparse Jacobian by
 
     law(l - l0, dl/dt, k1, k3, d1, d3)
 
@@ -17,6 +17,7 @@ import numba
 import numpy as np
 from numba import njit, types
 
+from mcmj.lawtable import law_address
 from mcmj.leapfrog import (
     COMPILE,
     add_dampers,
@@ -32,7 +33,6 @@ from mcmj.memory import (
     TAG,
     WORDS,
     CFunction,
-    bits,
     call_coupled,
     call_pull,
     doubles,
@@ -43,7 +43,7 @@ from mcmj.structs import byte_offset, word_offsets
 SPRING_USER_SIZE = 7
 
 _MODEL = (
-    "nv ntendon nuserdata nnumeric numeric_adr numeric_data dof_M0 nuser_tendon tendon_user "
+    "nv ntendon nuserdata nnumeric nnumericdata numeric_adr numeric_data dof_M0 nuser_tendon tendon_user "
     "tendon_damping tendon_dampingpoly ten_J_rownnz ten_J_rowadr ten_J_colind"
 )
 _DATA = (
@@ -86,13 +86,14 @@ def add_coupled(model, data, at, leapfrog):
     column, jacobian = integers(model[at.ten_J_colind]), doubles(data[at.ten_J])
     length, velocity = doubles(data[at.ten_length]), doubles(data[at.ten_velocity])
     force = doubles(data[at.qfrc_passive])
-    count, law = 0, 0
+    count, key = 0, 0.0
     while count < model[at.ntendon]:  # springs are the first tendons
         user = doubles(model[at.tendon_user] + 8 * n_user * count)
         if user[0] != COUPLED_TAG:
             break
-        law = law if bits(user[1]) == 0 else bits(user[1])
+        key = key if user[1] == 0.0 else user[1]
         count += 1
+    law = law_address(key, count)
     if law == 0:
         return
     scratch = np.empty((3, count))
@@ -108,7 +109,7 @@ def add_coupled(model, data, at, leapfrog):
     x1, x2, pull = start, start + 8 * count, start + 16 * count
     call_coupled(law, x1, x2, model[at.tendon_user], count, n_user, pull)
     for tendon in range(count):
-        if bits(doubles(model[at.tendon_user] + 8 * n_user * tendon)[1]) == 0:
+        if doubles(model[at.tendon_user] + 8 * n_user * tendon)[1] == 0.0:
             continue  # cut
         for e in range(rowadr[tendon], rowadr[tendon] + rownnz[tendon]):
             force[column[e]] -= jacobian[e] * scratch[2, tendon]
@@ -124,11 +125,13 @@ def add_springs(model, data, at, leapfrog):
     force = doubles(data[at.qfrc_passive])
     for tendon in range(model[at.ntendon]):
         user = doubles(model[at.tendon_user] + 8 * n_user * tendon)
-        law = bits(user[1])
         if user[0] == COUPLED_TAG:
             add_coupled(model, data, at, leapfrog)
             return
-        if user[0] != TAG or law == 0:
+        if user[0] != TAG:
+            continue
+        law = law_address(user[1], 0)
+        if law == 0:
             continue
         first = rowadr[tendon]
         last = first + rownnz[tendon]

@@ -1,7 +1,6 @@
 """Spring laws beyond MuJoCo's own polynomial: any pull = law(x1, x2, k1, k3, d1, d3)."""
 
 import functools
-import struct
 from collections.abc import Callable
 from dataclasses import dataclass
 from math import tanh
@@ -10,6 +9,7 @@ import numba
 from numba import types
 
 from mcmj.errors import InvalidArgumentError, UnknownNameError
+from mcmj.lawtable import register
 from mcmj.memory import TAG
 
 Pull = Callable[[float, float, float, float, float, float], float]
@@ -46,10 +46,9 @@ class SpringLaw:
     def _compiled(self):
         return numba.cfunc(_SIGNATURE, cache=self.pull in _SUPPLIED)(self.pull)
 
-    @property
-    def address_as_double(self) -> float:
-        """The compiled law's address, its 64 bits read as a float64: fits tendon user data."""
-        return struct.unpack("<d", struct.pack("<Q", self._compiled.address))[0]
+    def key(self, n_springs: int) -> float:
+        """What tendon user data of a body of n_springs springs holds for this law."""
+        return register(self._compiled)
 
 
 def cubic(x1: float, x2: float, k1: float, k3: float, d1: float, d3: float) -> float:

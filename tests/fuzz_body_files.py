@@ -9,11 +9,12 @@ import re
 import subprocess
 import sys
 import time
+from contextlib import suppress
 
 import numpy as np
 
 BATCH, HANG = 50, 20
-LAWS = ("native", "leapfrog", "cubic", "tansig")
+LAWS = ("native", "leapfrog", "cubic", "tansig", "coupled")
 VALUES = ("0", "-1", "nan", "inf", "1e308", "5e-324", "0x1p-1074", "5e8", "9" * 5000, "", "a", "é")
 TAGS = ("include", "replicate", "composite", "geom", "joint", "size", "key", "equality", "plugin")
 
@@ -47,12 +48,18 @@ def mutated(text: str, rng: np.random.Generator) -> str:
 
 
 def batch(seed: int) -> None:
-    """Mutations `seed` to `seed + BATCH`: loaded, then stepped under every callback."""
+    """Mutations `seed` to `seed + BATCH`: stepped as they are and as the Body that they hold."""
+    import mujoco
+
     import mcmj
     from mcmj import laws
+    from mcmj.bodyfile import load_model
+    from mcmj.coupled_laws import CoupledLaw
     from mcmj.errors import McmjError
+    from mcmj.quiet import quiet_warnings
 
-    laws.install()
+    laws.install(springs=True, leapfrog=True)
+    coupled = CoupledLaw("all_springs", _all_springs)
     for i in range(seed, seed + BATCH):
         print(i, flush=True)
         faulthandler.dump_traceback_later(HANG, exit=True)
@@ -60,13 +67,25 @@ def batch(seed: int) -> None:
         law = LAWS[i % len(LAWS)]
         body = mcmj.random_body(i, 5)
         how = {"integrator": "leapfrog"} if law == "leapfrog" else {"springs": law}
-        with np.errstate(all="ignore"):
+        if law == "coupled":
+            how = {"springs": coupled}
+        w_out = rng.normal(size=(body.n_springs + 1, body.n_outputs))
+        text = mutated(mcmj.to_mjcf(body, w_out=w_out, **how), rng)
+        with np.errstate(all="ignore"), quiet_warnings():
             try:
-                read, _w_out = mcmj.from_mjcf(mutated(mcmj.to_mjcf(body, **how), rng))
+                model = load_model(text)
+                with suppress(mujoco.FatalError):  # MuJoCo's own limits
+                    mujoco.mj_step(model, mujoco.MjData(model), 5)
+                read, _w_out = mcmj.from_mjcf(text)
                 mcmj.Simulation(read, timestep=1e-3, **how).rollout(5)
             except McmjError as error:
                 if "\n" in str(error):
                     raise RuntimeError("expected one line") from error
+
+
+def _all_springs(x1, x2, parameters, out):
+    for j in range(out.size):
+        out[j] = parameters[j, 0] * x1[j] + parameters[j, 2] * x2[j]
 
 
 def run_batch(seed: int) -> None:
