@@ -57,17 +57,15 @@ def load_model(xml_or_path: str | Path, max_bytes: int = MAX_BYTES) -> mujoco.Mj
 
 def _require_readouts_inside(model: mujoco.MjModel, source: str) -> None:
     """Every readout reads sensors that exist; the callback ignores one that does not."""
-    ours = np.flatnonzero(
-        (model.actuator_biasprm[:, 1] == TAG) & (model.actuator_biasprm[:, 0] != 0)
-    )
-    for actuator in ours:
+    gates, tags = model.actuator_biasprm[:, :2].T
+    for actuator in np.flatnonzero((tags == TAG) & (gates != 0)):
         first, count = model.actuator_biasprm[actuator, 2:4]
         room = min(model.nuser_actuator, model.nsensordata - first)
         if not (first >= 0 and 1 <= count <= room):
             raise BodyFileError(
-                f"{source}: actuator {model.actuator(actuator).name!r}: its readout reads {count:g} "
-                f"numbers from sensor {first:g} on with {model.nuser_actuator} weights, of "
-                f"{model.nsensordata} that exist"
+                f"{source}: actuator {model.actuator(actuator).name!r}: its readout reads "
+                f"{count:g} numbers from sensor {first:g} on with {model.nuser_actuator} weights, "
+                f"of {model.nsensordata} that exist"
             )
 
 

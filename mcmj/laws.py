@@ -44,7 +44,7 @@ def _compile_readout() -> CFunction:
         if parameters[first + 1] != TAG or gate == 0.0:
             return 0.0
         n_user, start, count = model[n_user_at], parameters[first + 2], parameters[first + 3]
-        inside = 0.0 <= start and 1.0 <= count <= n_user and start + count <= model[n_data_at]
+        inside = start >= 0.0 and 1.0 <= count <= n_user and start + count <= model[n_data_at]
         if not inside:  # also NaN: a model that mcmj did not write
             return 0.0
         n_sensors = numba.int64(count)

@@ -43,8 +43,8 @@ from mcmj.structs import byte_offset, word_offsets
 SPRING_USER_SIZE = 7
 
 _MODEL = (
-    "nv ntendon nuserdata nnumeric nnumericdata numeric_adr numeric_data dof_M0 nuser_tendon tendon_user "
-    "tendon_damping tendon_dampingpoly ten_J_rownnz ten_J_rowadr ten_J_colind"
+    "nv ntendon nuserdata nnumeric nnumericdata numeric_adr numeric_data dof_M0 nuser_tendon "
+    "tendon_user tendon_damping tendon_dampingpoly ten_J_rownnz ten_J_rowadr ten_J_colind"
 )
 _DATA = (
     "time qvel userdata ten_J ten_length ten_velocity qfrc_damper qfrc_passive qfrc_actuator "

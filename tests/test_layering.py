@@ -59,6 +59,7 @@ CHAINS = (
     (("search.database", "search.workers"), ("search.runner",)),
     (("search.runner",), ("experiments.search",)),
     (("simulation", "metrics"), ("experiments.limit_cycle",)),
+    (("lawtable",), ("spring_laws",)),
     (("spring_laws",), ("coupled_laws",)),
     (("body",), ("arrays",)),
     (("coupled_laws", "arrays"), ("emulation",)),
