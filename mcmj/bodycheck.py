@@ -1,19 +1,29 @@
-"""What a model holds that a Body cannot say: named, never dropped."""
+"""What a model holds that a Body cannot say: named, never dropped.
+
+A Body that was read from a model is written again and compiled: every field that physics
+depends on must be the model's own. So nothing must be thought of that a file could ask for.
+"""
+
+import re
 
 import mujoco
 import numpy as np
 
 from mcmj.errors import BodyFileError
 
-NONE = ("neq", "nexclude", "npair", "nflex", "nskin", "nplugin", "nmocap", "nkey", "na")
-ZERO = (
-    *("jnt_stiffness", "jnt_limited", "dof_damping", "dof_armature", "dof_frictionloss"),
-    *("jnt_stiffnesspoly", "dof_dampingpoly", "body_gravcomp", "geom_contype", "geom_conaffinity"),
-    *("tendon_limited", "tendon_armature", "tendon_frictionloss", "tendon_actfrclimited"),
-    *("jnt_actfrclimited", "actuator_forcelimited", "actuator_ctrllimited", "actuator_dyntype"),
-    *("actuator_damping", "actuator_armature", "actuator_delay", "sensor_noise", "sensor_cutoff"),
+# what changes no motion here: looks, what MuJoCo derives, what only contacts, limits or rotations
+# use; user data, which is read by itself; and what several steps, delays or laws differ in
+_PER_ELEMENT = re.compile(r"(body|jnt|dof|tendon|wrap|actuator|sensor)_|site_(bodyid|pos)|qpos")
+_HARMLESS = re.compile(
+    r".*_(user|group|rgba|matid|width|sol(ref|imp|mix)\w*|range|margin|invweight0|sameframe"
+    r"|treeid|treenum|Madr|simple\w*|bvh\w+|geom\w+|con(type|affinity)|lengthrange|ctrlrange|forcerange)"
+    r"|body_(mass|subtreemass|inertia|ipos|iquat)|jnt_pos|(dof|tendon|actuator)_(M0|length0?|acc0)"
 )
-DISABLED = (
+_ROUNDED = {"sensor_delay", "sensor_interval"}  # sums of steps
+_NONE = ("neq", "npair", "nexclude", "nflex", "nskin", "nplugin", "nmocap", "nkey", "na")
+_OPTIONS = ("gravity", "wind", "density", "viscosity", "disableactuator", "enableflags")
+_NAMED = ("body", "joint", "site", "tendon", "actuator", "sensor")
+_DISABLED = (
     mujoco.mjtDisableBit.mjDSBL_SPRING
     | mujoco.mjtDisableBit.mjDSBL_DAMPER
     | mujoco.mjtDisableBit.mjDSBL_ACTUATION
@@ -22,49 +32,69 @@ DISABLED = (
 )
 
 
-def require_only_a_body(model: mujoco.MjModel, free: int, tendons: int, channels: int) -> None:
-    """Refuse what a Body of `free` free nodes, so many tendons and channels does not hold.
+def require_same_physics(model: mujoco.MjModel, again: mujoco.MjModel) -> None:
+    """Refuse a model whose Body, written and compiled `again`, is another model.
 
     Raises:
-        BodyFileError: names the field of MuJoCo's model, and the first element that has it.
+        BodyFileError: names the field of MuJoCo's model, the element, and both values.
     """
-    for name in ("gravity", "wind", "density", "viscosity"):
-        if np.any(getattr(model.opt, name)):
-            _refuse(f"option {name} = {getattr(model.opt, name)}")
-    if model.opt.disableflags & DISABLED:
-        _refuse("a flag that disables springs, dampers, actuators or sensors")
-    for name in NONE:
+    for name in _NONE:
         if getattr(model, name, 0):
-            _refuse(f"{name} = {getattr(model, name)}")
-    for name in ZERO:
-        rows = np.atleast_1d(getattr(model, name, 0))
-        bad = np.flatnonzero(rows.reshape(len(rows), -1).any(axis=1)) if rows.size else rows
+            _refuse(name, getattr(model, name), 0)
+    for name in _OPTIONS:
+        found, said = getattr(model.opt, name), getattr(again.opt, name)
+        if np.any(found != said):
+            _refuse(f"option {name}", found, said)
+    if model.opt.disableflags & _DISABLED:
+        _refuse("a flag disables springs, dampers, actuators or sensors", "set", "unset")
+    for name in ("geom_contype", "geom_conaffinity"):
+        bad = np.flatnonzero(getattr(model, name))
         if bad.size:
-            kind = {"jnt": "joint", "dof": "dof"}.get(name.split("_")[0], name.split("_")[0])
-            _refuse(f"{name} of {kind} {_name(model, kind, int(bad[0]))}")
-    _require_planar(model)
-    wanted = {"nbody": free + 1, "njnt": 2 * free, "ntendon": tendons, "nu": channels}
-    for name, number in wanted.items():
-        if getattr(model, name) != number:
-            _refuse(f"{name} = {getattr(model, name)} where its nodes and springs need {number}")
+            _refuse(f"{name} of geom {model.geom(int(bad[0])).name!r}", "not 0", "no contact")
+    for kind in _NAMED:
+        _require_same_names(kind, _names(model, kind), _names(again, kind))
+    for name in dir(again):
+        if _PER_ELEMENT.match(name) and not _HARMLESS.fullmatch(name):
+            _require_same_rows(name, model, again)
 
 
-def _require_planar(model: mujoco.MjModel) -> None:
-    """Nodes are bodies of the world at z = 0, each with slides along x and y."""
-    if np.any(model.body_parentid) or np.any(model.body_pos[:, 2]) or np.any(model.site_pos[:, 2]):
-        _refuse("a body inside another, or off the plane z = 0")
-    slide = model.jnt_type == mujoco.mjtJoint.mjJNT_SLIDE
-    along = np.isin(model.jnt_axis, (0.0, 1.0)).all() and not np.any(model.jnt_axis[:, 2])
-    if not slide.all() or not along or np.any(model.body_quat[:, 1:]):
-        _refuse("a joint that is not a slide along x or y")
-    if np.any(model.actuator_gear[:, 0] != 1) or np.any(model.actuator_gear[:, 1:]):
-        _refuse("an actuator whose gear is not 1")
+def _require_same_names(kind: str, found: list[str], said: list[str]) -> None:
+    if found == said:
+        return
+    extra = [name for name in found if name not in said]
+    missing = [name for name in said if name not in found]
+    if extra:
+        _refuse(f"{kind} {extra[0]!r}", "there is one", "none")
+    if missing:
+        _refuse(f"{kind} {missing[0]!r}", "none", "there is one")
+    _refuse(f"the order of {kind} names", found, said)
 
 
-def _name(model: mujoco.MjModel, kind: str, index: int) -> str:
-    holder = model.joint(model.dof_jntid[index]) if kind == "dof" else getattr(model, kind)(index)
-    return repr(holder.name or index)
+def _require_same_rows(name: str, model: mujoco.MjModel, again: mujoco.MjModel) -> None:
+    found, said = np.asarray(getattr(model, name)), np.asarray(getattr(again, name))
+    if found.shape != said.shape:
+        _refuse(f"the size of {name}", found.shape, said.shape)
+    same = np.isclose(found, said, rtol=1e-6) if name in _ROUNDED else found == said
+    if not same.all():
+        row = int(np.argwhere(~same)[0][0])
+        _refuse(f"{name} of {_element(model, name, row)}", found[row], said[row])
 
 
-def _refuse(what: str) -> None:
-    raise BodyFileError(f"not an mcmj body: a Body cannot hold {what}")
+def _names(model: mujoco.MjModel, kind: str) -> list[str]:
+    number = {"joint": "njnt", "actuator": "nu"}.get(kind, f"n{kind}")
+    return [getattr(model, kind)(i).name for i in range(getattr(model, number))]
+
+
+def _element(model: mujoco.MjModel, field: str, row: int) -> str:
+    kind = {"jnt": "joint", "qpos": "joint", "qpos0": "joint"}.get(field.split("_")[0])
+    kind = kind or field.split("_")[0]
+    if kind == "dof":
+        return f"joint {model.joint(int(model.dof_jntid[row])).name!r}"
+    if kind in _NAMED:
+        return f"{kind} {getattr(model, kind)(row).name!r}"
+    return f"{kind} {row}"
+
+
+def _refuse(what: str, found: object, said: object) -> None:
+    shown = [" ".join(str(value).split())[:80] for value in (found, said)]
+    raise BodyFileError(f"not an mcmj body: {what}: {shown[0]}, where a Body says {shown[1]}")

@@ -3,16 +3,18 @@
 import json
 import re
 from pathlib import Path
+from typing import Any
 
 import mujoco
 import numpy as np
 
 from mcmj.body import Body
-from mcmj.bodycheck import require_only_a_body
+from mcmj.bodycheck import require_same_physics
 from mcmj.bodyscan import MAX_BYTES, read_body_file, scan
 from mcmj.errors import BodyFileError, InvalidArgumentError
+from mcmj.leapfrog import LEAPFROG
 from mcmj.memory import COUPLED_TAG, TAG
-from mcmj.mjcf import READOUT_PREFIX
+from mcmj.mjcf import INTEGRATORS, READOUT_PREFIX, to_mjcf
 from mcmj.quiet import quiet_warnings
 from mcmj.validation import Array
 
@@ -45,14 +47,18 @@ def load_model(xml_or_path: str | Path, max_bytes: int = MAX_BYTES) -> mujoco.Mj
     if not inline:
         text = read_body_file(text, max_bytes)
     scan(text, source, max_bytes)
+    model = _compiled(text, source)
+    _require_readouts_inside(model, source)
+    return model
+
+
+def _compiled(text: str, source: str) -> mujoco.MjModel:
     try:
         with quiet_warnings():
-            model = mujoco.MjModel.from_xml_string(text)
+            return mujoco.MjModel.from_xml_string(text)
     except (ValueError, mujoco.FatalError) as error:
         reason = " ".join(str(error).split())
         raise BodyFileError(f"{source}: MuJoCo cannot compile it: {reason}") from error
-    _require_readouts_inside(model, source)
-    return model
 
 
 def _require_readouts_inside(model: mujoco.MjModel, source: str) -> None:
@@ -73,7 +79,7 @@ def body_of_model(model: mujoco.MjModel) -> Body:
     """The Body inside a compiled model.
 
     Raises:
-        BodyFileError: the model is not an mcmj body.
+        BodyFileError: the model is not an mcmj body, or holds physics that a Body cannot say.
     """
     nodes = _ids(model, mujoco.mjtObj.mjOBJ_SITE, "n", model.nsite)
     springs = _ids(model, mujoco.mjtObj.mjOBJ_TENDON, "s", model.ntendon)
@@ -101,9 +107,25 @@ def body_of_model(model: mujoco.MjModel) -> Body:
     except InvalidArgumentError as error:
         raise BodyFileError(f"not a valid mcmj body: {error}") from error
     _require_moderate(body)
-    channels = body.n_inputs + body.n_outputs
-    require_only_a_body(model, len(body.free), len(springs) + channels, channels)
+    require_same_physics(model, _compiled(_written_again(model, body), "the body written again"))
     return body
+
+
+def _written_again(model: mujoco.MjModel, body: Body) -> str:
+    """The body as a file with the model's step, delays and kind of springs."""
+    step, delay, period = _timing(model)
+    closed = readout_of_model(model) is not None
+    try:
+        return to_mjcf(
+            body,
+            timestep=step,
+            w_out=np.zeros((body.n_springs, body.n_outputs)) if closed else None,
+            springs="cubic" if _by_callback(model) else "native",
+            feedback_delay=delay,
+            control_period=period,
+        )
+    except InvalidArgumentError as error:
+        raise BodyFileError(f"not a valid mcmj body: {error}") from error
 
 
 def _require_moderate(body: Body) -> None:
@@ -167,6 +189,36 @@ def spring_law_of_model(model: mujoco.MjModel) -> str:
     return _text(model, "spring_law") or "native"
 
 
+def settings_of_model(model: mujoco.MjModel) -> dict[str, Any]:
+    """How the file says that its body is stepped: arguments of a Simulation."""
+    step, delay, period = _timing(model)
+    leapfrog = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_NUMERIC, LEAPFROG) >= 0
+    control = period or step
+    return {
+        "timestep": control,
+        # MuJoCo's numbers are in the order of these names
+        "integrator": LEAPFROG if leapfrog else INTEGRATORS[int(model.opt.integrator)],
+        "springs": spring_law_of_model(model),
+        "feedback_delay": round(delay / control),
+        "substeps": max(1, round(control / step)),
+    }
+
+
+def _timing(model: mujoco.MjModel) -> tuple[float, float, float]:
+    """Physics step, delay and sampling period of the fed-back lengths [s]; see mjcf."""
+    step = float(model.opt.timestep)
+    if model.nsensor == 0:
+        return step, 0.0, 0.0
+    delay, period = float(model.sensor_delay[0]), float(model.sensor_interval[0, 0])
+    return step, delay + step / 2 if delay > 0 else 0.0, period
+
+
+def _by_callback(model: mujoco.MjModel) -> bool:
+    springs = _ids(model, mujoco.mjtObj.mjOBJ_TENDON, "s", model.ntendon)
+    tags = model.tendon_user[springs, :1]
+    return tags.size > 0 and bool(np.isin(tags, (TAG, COUPLED_TAG)).all())
+
+
 def _ids(model: mujoco.MjModel, kind: mujoco.mjtObj, prefix: str, total: int) -> np.ndarray:
     """Ids of <prefix>0, <prefix>1, .. up to the first that is missing."""
     found: list[int] = []
@@ -191,7 +243,7 @@ def _spring_ends(model: mujoco.MjModel, springs: np.ndarray, nodes: np.ndarray) 
 
 
 def _spring_parameters(model: mujoco.MjModel, springs: np.ndarray) -> dict[str, Array]:
-    if model.nuser_tendon and np.isin(model.tendon_user[springs, 0], (TAG, COUPLED_TAG)).all():
+    if _by_callback(model):
         columns = model.tendon_user[springs, 2:7].T
         return dict(zip(("rest_lengths", "k1", "k3", "d1", "d3"), columns, strict=True))
     if model.tendon_stiffnesspoly[springs, 0].any() or model.tendon_dampingpoly[springs, 0].any():

@@ -4,11 +4,13 @@ import os
 import re
 from contextlib import suppress
 
+import numpy as np
 import pytest
 
 import mcmj
-from mcmj.bodyfile import body_of_model, load_model, provenance_of_model
+from mcmj.bodyfile import body_of_model, load_model, provenance_of_model, settings_of_model
 from mcmj.errors import BodyFileError
+from mcmj.mjcf import INTEGRATORS
 
 BODY = mcmj.to_mjcf(mcmj.random_body(0, 5), w_out=None)
 WORLD = "<worldbody>"
@@ -94,18 +96,56 @@ UNSAID = {
     "dof_damping": ('axis="1 0 0"', 'axis="1 0 0" damping="1"'),
     "jnt_stiffness": ('axis="1 0 0"', 'axis="1 0 0" stiffness="1"'),
     "jnt_limited": ('axis="1 0 0"', 'axis="1 0 0" limited="true" range="-1 1"'),
-    "joint that is not": ('type="slide" axis="1 0 0"', 'type="hinge" axis="0 0 1"'),
+    "jnt_axis of joint 'n": ('type="slide" axis="1 0 0"', 'type="hinge" axis="0 0 1"'),
+    "qpos0 of joint": ('axis="1 0 0"', 'axis="1 0 0" ref="1"'),
     "geom_contype": ("</worldbody>", '<geom type="sphere" size="1"/></worldbody>'),
-    "nbody": ("</worldbody>", "<body/></worldbody>"),
+    "body ''": ("</worldbody>", "<body/></worldbody>"),
     "gear": ("<motor ", '<motor gear="2" '),
-    "nu": ("</actuator>", '<motor name="more" tendon="s0"/></actuator>'),
-    "z = 0": (' 0.0">', ' 1.0">'),
+    "actuator 'more'": ("</actuator>", '<motor name="more" tendon="s0"/></actuator>'),
+    "sensor 'more'": ("</sensor>", '<tendonvel name="more" tendon="s0"/></sensor>'),
+    "tendon_lengthspring of tendon 's0'": ('springlength="', 'springlength="0.01 '),
+    "tendon_stiffness of tendon 'in0'": ('<fixed name="in0"', '<fixed name="in0" stiffness="1"'),
+    "tendon_damping of tendon 'in0'": ('<fixed name="in0"', '<fixed name="in0" damping="1"'),
+    "actuator_gainprm of actuator 'fb0'": ('biastype="user"', 'biastype="user" gainprm="2"'),
+    "actuator_biasprm of actuator 'in0'": ("<motor ", '<general biastype="affine" biasprm="1" '),
+    "body_pos": (' 0.0">', ' 1.0">'),
+    "enableflags": ("<flag ", '<flag sleep="enable" '),
+    "disables springs": ("<flag ", '<flag spring="disable" '),
 }  # fmt: skip
 
 
 @pytest.mark.parametrize("name", UNSAID)
 def test_what_a_body_cannot_say_is_refused_by_name(name):
     old, new = UNSAID[name]
-    text = mcmj.to_mjcf(mcmj.random_body(0, 5, n_inputs=1)).replace(old, new, 1)
+    given = mcmj.to_mjcf(mcmj.random_body(0, 5, n_inputs=1))
+    text = given.replace(old, new, 1)
+    assert text != given
     with pytest.raises(BodyFileError, match=name):
         mcmj.from_mjcf(text)
+
+
+@pytest.mark.parametrize("axis", "xy")
+def test_a_node_that_slides_along_one_axis_only_is_refused(axis):
+    given = mcmj.to_mjcf(mcmj.random_body(0, 5, n_outputs=0, n_inputs=0))
+    text = re.sub(rf'<joint name="n[0-9]+{axis}"[^>]*>', "", given, count=1)
+    assert text != given
+    with pytest.raises(BodyFileError, match=rf"joint 'n[0-9]+{axis}'"):
+        mcmj.from_mjcf(text)
+
+
+@pytest.mark.parametrize("integrator", INTEGRATORS)
+@pytest.mark.parametrize("springs", ["native", "cubic", "tansig"])
+@pytest.mark.parametrize(("delay", "period"), [(0, 0), (2e-3, 0), (0, 4e-3), (8e-3, 4e-3)])
+def test_whatever_mcmj_writes_is_read(integrator, springs, delay, period):
+    body = mcmj.random_body(0, 5, n_inputs=1)
+    w_out = np.ones((body.n_springs + 1, body.n_outputs))
+    text = mcmj.to_mjcf(
+        body, timestep=1e-3 / 3, integrator=integrator, springs=springs, w_out=w_out,
+        feedback_delay=delay, control_period=period, readouts={"a": w_out},
+    )  # fmt: skip
+    assert mcmj.from_mjcf(text)[0] == body
+    settings = settings_of_model(load_model(text))
+    assert (settings["integrator"], settings["springs"]) == (integrator, springs)
+    assert settings["timestep"] == (period or 1e-3 / 3)
+    assert settings["feedback_delay"] == round(delay / settings["timestep"])
+    assert settings["substeps"] == (12 if period else 1)
