@@ -2,6 +2,7 @@
 
 import json
 import sys
+import warnings
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -9,7 +10,7 @@ from typing import Annotated, TypeVar
 
 import tyro
 
-from mcmj.errors import McmjError
+from mcmj.errors import McmjError, McmjWarning
 from mcmj.store import prepare_folder
 
 C = TypeVar("C")
@@ -50,6 +51,8 @@ def main(name: str, config_type: type[C], work: Callable[[C, Output, Path], None
             document = json.loads((folder / "metrics.json").read_text(encoding="utf-8"))
             print(json.dumps(document["metrics"], indent=2))
 
+    as_before = warnings.formatwarning
+    warnings.formatwarning = _one_line(name, as_before)
     try:
         tyro.cli(command, prog=f"{name}.py")
     except McmjError as error:
@@ -57,3 +60,18 @@ def main(name: str, config_type: type[C], work: Callable[[C, Output, Path], None
     except KeyboardInterrupt:
         print(f"{name}: interrupted; nothing half-written is left", file=sys.stderr)
         sys.exit(130)
+    finally:
+        warnings.formatwarning = as_before
+
+
+def _one_line(name: str, other: Callable[..., str]) -> Callable[..., str]:
+    """How warnings are shown: ours as errors are, in one line."""
+
+    def shown(
+        message: Warning | str, category: type[Warning], *where: object, **line: object
+    ) -> str:
+        if issubclass(category, McmjWarning):
+            return f"{name}: warning: {message}\n"
+        return other(message, category, *where, **line)
+
+    return shown

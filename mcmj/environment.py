@@ -230,7 +230,7 @@ def load(
     Raises:
         UnknownNameError: no such body or task.
     """
-    given = assign(name, task)
+    given = assign(name, task, setting)
     return make(given.body, given.w_out, given.target, setting, random, inputs=given.inputs)
 
 

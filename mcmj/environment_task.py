@@ -11,18 +11,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from mcmj.body import Body
-from mcmj.bodyfile import (
-    body_of_model,
-    load_model,
-    provenance_of_model,
-    readout_of_model,
-    readouts_of_model,
-)
+from mcmj.bodyfile import from_mjcf
 from mcmj.driven import QUADRATIC
+from mcmj.environment_setting import Setting
 from mcmj.errors import InvalidArgumentError, UnknownNameError
 from mcmj.gaits import GAITS, LEGS, NAMES, named_target
 from mcmj.lessons import Teaching
-from mcmj.library import body_names, body_path
+from mcmj.library import StoredBody, body_names, open_body
+from mcmj.mjcf import to_mjcf
 from mcmj.options import Options
 from mcmj.simulation import Simulation
 from mcmj.targets import TARGETS, Target
@@ -50,32 +46,35 @@ class Assignment:
     inputs: Array
 
 
-def assign(name: str, task: str | None = None) -> Assignment:
+def assign(name: str, task: str | None = None, setting: Setting | None = None) -> Assignment:
     """A body by its name, or of a body file, and its task.
 
     Args:
         name: a body that comes with mcmj, or a path.
         task: default: the first that the file holds a readout for. Without one for it in the
             file the body is taught it first.
+        setting: how the body will be stepped.
 
     Raises:
         UnknownNameError: no such body, or no such task for it.
         InvalidArgumentError: there is no task for so many outputs.
     """
-    body, readouts = _read(name)
+    stored, setting = open_body(name), setting or Setting()
+    stored.take(timestep=setting.timestep, integrator=setting.integrator)
+    body, readouts = stored.body, _taught_already(stored)
     if body.n_outputs not in TEACHABLE:
         raise InvalidArgumentError("body", "2 outputs, or 4 for gaits", body.n_outputs)
     choices = [*readouts, *TEACHABLE[body.n_outputs]]
     task = task or choices[0]
     if task not in choices:
         raise UnknownNameError(f"task of {body!r}", task, set(choices))
-    w_out = readouts[task] if task in readouts else _taught(name, task)
+    w_out = readouts[task] if task in readouts else _taught(to_mjcf(body), task)
     return Assignment(body, w_out, _target(task), np.full(body.n_inputs, DRIVEN.get(task, 0.0)))
 
 
 def all_tasks() -> list[tuple[str, str]]:
     """Names of bodies that come with mcmj, and of tasks that their files hold readouts for."""
-    return [(name, task) for name in body_names() for task in _read(name)[1]]
+    return [(name, task) for name in body_names() for task in _taught_already(open_body(name))]
 
 
 def state_on_cycle(body: Body, wanted: Target, inputs: Array, options: Options) -> State:
@@ -85,14 +84,12 @@ def state_on_cycle(body: Body, wanted: Target, inputs: Array, options: Options) 
     return simulation.state
 
 
-def _read(name: str) -> tuple[Body, dict[str, Array]]:
-    """A body, and the readouts (L or L + 1, n_outputs) in its file by task."""
-    model = load_model(body_path(name))
-    active, named = readout_of_model(model), readouts_of_model(model)
-    readouts = {task: w_out for task, w_out in named.items() if task in NAMES}
-    if active is not None and "taught_inputs" in (provenance_of_model(model) or {}):
-        readouts = dict.fromkeys(DRIVEN, active) | readouts
-    return body_of_model(model), readouts
+def _taught_already(stored: StoredBody) -> dict[str, Array]:
+    """The readouts (L or L + 1, n_outputs) in a body file by task."""
+    readouts = {task: w_out for task, w_out in stored.readouts.items() if task in NAMES}
+    if stored.w_out is not None and "taught_inputs" in stored.provenance:
+        readouts = dict.fromkeys(DRIVEN, stored.w_out) | readouts
+    return readouts
 
 
 def _target(task: str) -> Target:
@@ -100,5 +97,5 @@ def _target(task: str) -> Target:
 
 
 @functools.cache
-def _taught(name: str, task: str) -> Array:
-    return teach(Simulation(_read(name)[0]), _target(task), Teaching(), seed=0).w_out
+def _taught(xml: str, task: str) -> Array:
+    return teach(Simulation(from_mjcf(xml)[0]), _target(task), Teaching(), seed=0).w_out

@@ -61,5 +61,9 @@ class StabilityWarning(McmjWarning):
     """A simulation that will blow up: its step is above the integrator's stability limit."""
 
 
+class OtherPhysicsWarning(McmjWarning):
+    """A run that does not take the step, integrator, springs or delay of its body file."""
+
+
 class StoreError(McmjError, ValueError):
     """A store of trials that cannot be used: damaged, of another version, or something else."""

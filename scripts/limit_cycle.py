@@ -12,7 +12,7 @@ from rich.table import Table
 
 from mcmj import plotting, store
 from mcmj.cli import Output, main
-from mcmj.experiments.limit_cycle import Result, checkpoints, run
+from mcmj.experiments.limit_cycle import Result, run
 from mcmj.experiments.limit_cycle_config import Config, total_steps
 from mcmj.mjcf import to_mjcf
 from mcmj.progress import progress_bar
@@ -27,7 +27,7 @@ def work(config: Config, output: Output, out: Path) -> None:
             print("limit_cycle: the same command goes on from the last chunk", file=sys.stderr)
             raise
     write(result, out)
-    for checkpoint in checkpoints(config, out).values():
+    for checkpoint in result.checkpoints.values():
         checkpoint.remove()
     if output.video:
         write_videos(result, out)

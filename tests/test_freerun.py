@@ -49,19 +49,21 @@ def small_chunks(monkeypatch):
 
 @pytest.mark.parametrize("parts", [3, 6, 9])
 def test_an_interrupted_run_goes_on_bit_for_bit(small_chunks, tmp_path, parts):
-    whole = limit_cycle.run_tasks(CONFIG)["quadratic"]
+    found = limit_cycle.get_body(CONFIG)
+    kept = limit_cycle.checkpoints(CONFIG, tmp_path, found)
+    whole = limit_cycle.run_tasks(CONFIG, found)["quadratic"]
     with pytest.raises(StopError):
-        limit_cycle.run_tasks(CONFIG, folder=tmp_path, on_steps=stop_after(parts))
+        limit_cycle.run_tasks(CONFIG, found, kept, on_steps=stop_after(parts))
     assert len(list(tmp_path.iterdir())) == 2
     counted = []
-    again = limit_cycle.run_tasks(CONFIG, folder=tmp_path, on_steps=counted.append)["quadratic"]
+    again = limit_cycle.run_tasks(CONFIG, found, kept, on_steps=counted.append)["quadratic"]
     for name in ("times", "outputs", "positions", "w_out"):
         assert np.array_equal(getattr(again, name), getattr(whole, name)), name
     assert dataclasses.replace(again.fit, w_out=None) == dataclasses.replace(whole.fit, w_out=None)
     assert again.errors == whole.errors
     assert sum(counted) == 30_000
     assert counted[0] >= 15_000 + 1000 * (parts - 1)  # nothing taught or run twice
-    for checkpoint in limit_cycle.checkpoints(CONFIG, tmp_path).values():
+    for checkpoint in kept.values():
         checkpoint.remove()
     assert not list(tmp_path.iterdir())
 

@@ -1,17 +1,22 @@
 """The bodies that come with mcmj: what they are, and that each does what its name says."""
 
+import subprocess
+import sys
 from dataclasses import fields
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 import mcmj
 from mcmj.bodyfile import load_model, provenance_of_model, readouts_of_model
-from mcmj.errors import UnknownNameError
+from mcmj.errors import OtherPhysicsWarning, UnknownNameError
+from mcmj.experiments import limit_cycle, limit_cycle_config, perturb, render, view
 from mcmj.library import body_names, body_path
 from mcmj.metrics import orbit_error
 from mcmj.teaching import synchronise
 
+SCRIPTS = Path(__file__).parent.parent / "scripts"
 SPECIALISED = {"van_der_pol": (10, 22), "quadratic": (20, 51), "lissajous": (20, 48)}
 
 
@@ -53,3 +58,70 @@ def test_an_unknown_body_lists_those_there_are():
         UnknownNameError, match="general, input_driven, lissajous, quadratic, van_der_pol"
     ):
         body_path("nobody")
+
+
+def written(path, name="quadratic", **how):
+    """The body of a name in a file of its own, with its readout, written in another way."""
+    body, w_out = mcmj.from_mjcf(body_path(name))
+    text = mcmj.to_mjcf(body, w_out=w_out, readouts={name: w_out}, **how)
+    path.write_text(text)
+    return str(path)
+
+
+OTHERS = {
+    "integrator RK4": {"integrator": "RK4"},
+    "timestep 0.0005": {"timestep": 5e-4},
+    "springs tansig": {"springs": "tansig"},
+    "feedback_delay 2": {"feedback_delay": 2e-3},
+}
+
+
+@pytest.mark.parametrize("said", OTHERS)
+def test_what_a_run_does_not_take_from_a_file_is_a_warning(said, tmp_path):
+    path = written(tmp_path / "body.xml", **OTHERS[said])
+    config = limit_cycle_config.Config(task="quadratic", body=path)
+    with pytest.warns(OtherPhysicsWarning, match=f"written for {said}; this run takes"):
+        limit_cycle_config.get_body(config)
+    with pytest.warns(OtherPhysicsWarning, match=said):
+        view._body_and_readouts(view.Config(body=path))
+
+
+def test_a_film_is_run_as_the_file_says(tmp_path):
+    how = {"integrator": "RK4", "timestep": 5e-4, "springs": "tansig"}
+    path = written(tmp_path / "body.xml", **how)
+    film = render.run(render.Config(body=path, from_rest=True, duration=0.2))
+    simulation = mcmj.Simulation(mcmj.from_mjcf(path)[0], w_out=mcmj.from_mjcf(path)[1], **how)
+    alone = simulation.rollout(400, record=("positions",)).positions
+    assert np.array_equal(film.positions, alone)
+    with pytest.warns(OtherPhysicsWarning, match=r"timestep 0\.0005; this run takes timestep 0"):
+        _body, _source, settings = perturb.get_body(perturb.Config(body=path), 0)
+    assert settings == how | {"timestep": 1e-3}
+
+
+def test_a_command_shows_a_warning_in_one_line(tmp_path):
+    law = mcmj.SpringLaw("mine", lambda x1, x2, k1, k3, d1, d3: k1 * x1 + d1 * x2)
+    path = written(tmp_path / "body.xml", springs=law)
+    command = [
+        *(sys.executable, SCRIPTS / "render.py", "--body", path, "--out", tmp_path / "film"),
+        *("--from-rest", "--duration", "0.1", "--formats", "png", "--stills", "1"),
+        *("--renderer", "matplotlib"),
+    ]
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
+    assert done.stderr.splitlines() == [
+        "render: warning: the body file was written for springs mine; this run takes springs native"
+    ]
+
+
+def test_a_body_file_is_read_once_a_run(tmp_path):
+    path = tmp_path / "body.xml"
+    config = limit_cycle.Config(
+        task="quadratic", body=written(path), free_run=25.0, measure_cost=False
+    )
+    kept = tmp_path / "run"
+    kept.mkdir()
+    result = limit_cycle.run(config, folder=kept, on_steps=lambda _: path.unlink(missing_ok=True))
+    assert not path.exists()
+    assert result.metrics["quadratic"]["orbit_error"] < 0.01
+    for checkpoint in result.checkpoints.values():
+        checkpoint.remove()
+    assert not list(kept.iterdir())

@@ -5,12 +5,11 @@ from itertools import permutations
 
 from mcmj import metrics
 from mcmj.body import Body
-from mcmj.bodyfile import body_of_model, load_model, provenance_of_model, readouts_of_model
 from mcmj.errors import InvalidArgumentError, UnknownNameError
 from mcmj.gaits import GAITS, LEGS, gait_target
 from mcmj.generator import BodySettings, draw_body
 from mcmj.lessons import Teaching
-from mcmj.library import body_path
+from mcmj.library import open_body
 from mcmj.practice import Practice
 from mcmj.validation import Array, require_count, require_number, require_timestep
 
@@ -102,10 +101,10 @@ def get_body(config: Config, seed: int) -> tuple[Body, dict[str, Array], dict[st
         source: dict[str, object] = {"seed": seed, "settings": asdict(config.settings)}
         body, readouts = draw_body(seed, config.settings), {}
     else:
-        model = load_model(body_path("gaits" if config.body is None else config.body))
-        body, source = body_of_model(model), provenance_of_model(model) or {}
-        stored = readouts_of_model(model)
-        readouts = {name: stored[name] for name in config.gaits if name in stored}
+        stored = open_body("gaits" if config.body is None else config.body)
+        stored.take(timestep=config.timestep)
+        body, source, held = stored.body, stored.provenance, stored.readouts
+        readouts = {name: held[name] for name in config.gaits if name in held}
     return body, readouts, source
 
 

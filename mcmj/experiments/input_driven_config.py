@@ -2,21 +2,13 @@
 
 import warnings
 from dataclasses import asdict, dataclass
-from typing import Any
 
 from mcmj.body import Body
-from mcmj.bodyfile import (
-    body_of_model,
-    load_model,
-    provenance_of_model,
-    readout_of_model,
-    readouts_of_model,
-)
 from mcmj.driven import QUADRATIC
 from mcmj.errors import InvalidArgumentError, McmjWarning, UnknownNameError
 from mcmj.generator import BodySettings, draw_body
 from mcmj.lessons import Teaching
-from mcmj.library import body_path
+from mcmj.library import open_body
 from mcmj.practice import Practice
 from mcmj.profiles import Profile, Ramp, hold
 from mcmj.validation import Array, require_count, require_number, require_timestep
@@ -177,11 +169,11 @@ def get_start(config: Config, seed: int) -> Start:
         check_channels(body)
         source = {"seed": seed, "settings": asdict(config.settings)}
         return Start(body, None, taught, {}, source, {})
-    model = load_model(body_path(config.body))
-    body, readouts = body_of_model(model), readouts_of_model(model)
+    stored = open_body(config.body)
+    stored.take(timestep=config.timestep)
+    body, readouts, account = stored.body, stored.readouts, stored.provenance
     check_channels(body)
-    account: dict[str, Any] = provenance_of_model(model) or {}
-    w_out = None if config.teach else _readout(config.readout, readout_of_model(model), readouts)
+    w_out = None if config.teach else _readout(config.readout, stored.w_out, readouts)
     if w_out is not None:
         taught = tuple(account.get("taught_inputs", taught))
     source, lessons = account.get("body", account), account.get("lessons", {})

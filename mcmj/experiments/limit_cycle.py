@@ -1,6 +1,7 @@
 """Fig. 5: one body learns a limit cycle by teacher forcing, then runs free in MuJoCo."""
 
 import hashlib
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -10,7 +11,7 @@ from mcmj import metrics
 from mcmj.body import Body
 from mcmj.checkpoint import Checkpoint
 from mcmj.errors import DivergenceError
-from mcmj.experiments.limit_cycle_config import Config, check_task, get_body
+from mcmj.experiments.limit_cycle_config import Config, Found, check_task, get_body
 from mcmj.experiments.loop_cost import closed_loop_cost
 from mcmj.freerun import free_run, resume, window_errors
 from mcmj.mjcf import to_mjcf
@@ -55,6 +56,7 @@ class Result:
     body: Body
     source: dict[str, object]
     tasks: dict[str, TaskResult]
+    checkpoints: dict[str, Checkpoint]
     steps_per_second: float | None
     closed_loop_cost_ratio: float | None
 
@@ -80,9 +82,9 @@ class Result:
         return table
 
 
-def checkpoints(config: Config, folder: Path) -> dict[str, Checkpoint]:
+def checkpoints(config: Config, folder: Path, found: Found) -> dict[str, Checkpoint]:
     """Where the free runs of a config keep what they need to go on, one a task."""
-    body, readouts, _ = get_body(config)
+    body, readouts, _ = found
     digest = hashlib.sha256(to_mjcf(body, readouts=readouts).encode()).hexdigest()
     return {
         name: Checkpoint(folder / f".checkpoint-{name}", [config, digest], body.n_outputs)
@@ -96,38 +98,46 @@ def run(
     """Teach and run every task, and measure what the closed loop costs.
 
     Args:
-        folder: where checkpoints are kept, and gone on from; `checkpoints` removes them.
+        folder: where checkpoints are kept, and gone on from; the result's may be removed.
         on_steps: called with the number of steps done after every chunk, for progress bars.
 
     Raises:
         DivergenceError: a simulation blew up.
         BodyFileError, InvalidArgumentError: a body that cannot do the task.
     """
-    body, _, source = get_body(config)
+    found = body, _, source = get_body(config)
+    kept = {} if folder is None else checkpoints(config, folder, found)
     tasks = {}
-    for name, outcome in run_tasks(config, folder=folder, on_steps=on_steps).items():
+    for name, outcome in run_tasks(config, found, kept, on_steps=on_steps).items():
         if isinstance(outcome, DivergenceError):
             raise outcome
         tasks[name] = outcome
     if not config.measure_cost:
-        return Result(config, body, source, tasks, None, None)
+        return Result(config, body, source, tasks, kept, None, None)
     w_out = next(iter(tasks.values())).w_out
     speed, ratio = closed_loop_cost(
         body, w_out, timestep=config.timestep, integrator=config.integrator
     )
-    return Result(config, body, source, tasks, speed, ratio)
+    return Result(config, body, source, tasks, kept, speed, ratio)
 
 
 def run_tasks(
-    config: Config, *, folder: Path | None = None, on_steps: OnSteps = lambda steps: None
+    config: Config,
+    found: Found,
+    kept: Mapping[str, Checkpoint] = {},
+    *,
+    on_steps: OnSteps = lambda steps: None,
 ) -> dict[str, TaskResult | DivergenceError]:
     """Teach and run every task, on several threads; a task that blew up is its error.
+
+    Args:
+        found: what `get_body` gave.
+        kept: of `checkpoints`, to go on from.
 
     Raises:
         BodyFileError, InvalidArgumentError: a body that cannot do the task.
     """
-    body, readouts, _ = get_body(config)
-    kept = {} if folder is None else checkpoints(config, folder)
+    body, readouts, _ = found
     targets = {name: target(name) for name in config.tasks}
     for wanted in targets.values():
         check_task(config, body, wanted)

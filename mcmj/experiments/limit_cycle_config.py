@@ -1,29 +1,19 @@
 """What the limit-cycle experiment runs: its Config, and the body and readouts it asks for."""
 
-import warnings
 from dataclasses import asdict, dataclass, field
-
-import mujoco
 
 from mcmj import metrics
 from mcmj.body import Body
-from mcmj.bodyfile import (
-    body_of_model,
-    load_model,
-    provenance_of_model,
-    readout_of_model,
-    readouts_of_model,
-    spring_law_of_model,
-)
-from mcmj.errors import InvalidArgumentError, McmjWarning, UnknownNameError
+from mcmj.errors import InvalidArgumentError, UnknownNameError
 from mcmj.freerun import WINDOW
 from mcmj.generator import BodySettings, draw_body
 from mcmj.lessons import Teaching
-from mcmj.library import body_path
+from mcmj.library import open_body
 from mcmj.options import DEFAULT_INTEGRATOR, ENGINES
-from mcmj.spring_laws import NATIVE
 from mcmj.targets import TARGETS, Target, target
 from mcmj.validation import Array, require_number, require_timestep
+
+Found = tuple[Body, dict[str, Array], dict[str, object]]  # what get_body gives
 
 
 @dataclass(frozen=True)
@@ -91,30 +81,17 @@ class Config:
         return 0 if self.seed is None else self.seed
 
 
-def get_body(config: Config) -> tuple[Body, dict[str, Array], dict[str, object]]:
+def get_body(config: Config) -> Found:
     """The config's body, the readouts that came with it, and where it comes from."""
     if config.body is None and (config.seed is not None or config.settings != BodySettings()):
         body = draw_body(config.noise_seed, config.settings)
         return body, {}, {"seed": config.noise_seed, "settings": asdict(config.settings)}
-    model = load_model(body_path("general" if config.body is None else config.body))
-    _warn_if_other_physics(config, model)
-    body, readouts = body_of_model(model), readouts_of_model(model)
-    active = readout_of_model(model)
-    if not readouts and active is not None and config.task != "all":
-        readouts = {config.task: active}
-    return body, readouts, provenance_of_model(model) or {}
-
-
-def _warn_if_other_physics(config: Config, model: mujoco.MjModel) -> None:
-    """A file may have been written for another step, integrator or spring law than is run."""
-    springs, step = spring_law_of_model(model), float(model.opt.timestep)
-    if springs != NATIVE or step != config.timestep:
-        warnings.warn(
-            f"the body file was written for {1e3 * step:g} ms and {springs} springs; this run "
-            f"takes {1e3 * config.timestep:g} ms, {config.integrator} and native springs",
-            McmjWarning,
-            stacklevel=2,
-        )
+    stored = open_body("general" if config.body is None else config.body)
+    stored.take(timestep=config.timestep, integrator=config.integrator)
+    readouts = stored.readouts
+    if not readouts and stored.w_out is not None and config.task != "all":
+        readouts = {config.task: stored.w_out}
+    return stored.body, readouts, stored.provenance
 
 
 def total_steps(config: Config) -> int:

@@ -2,15 +2,15 @@
 
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
 from mcmj import metrics
 from mcmj.body import Body
-from mcmj.bodyfile import body_of_model, load_model, provenance_of_model
 from mcmj.errors import DivergenceError, InvalidArgumentError, UnknownNameError
 from mcmj.generator import BodySettings, draw_body
-from mcmj.library import body_path
+from mcmj.library import open_body
 from mcmj.progress import OnSteps
 from mcmj.rates import success_rate
 from mcmj.readout import Fit
@@ -211,24 +211,26 @@ def run(config: Config, *, on_steps: OnSteps = lambda steps: None) -> Result:
     return Result(config, wanted, bodies)
 
 
-def get_body(config: Config, seed: int) -> tuple[Body, dict[str, object]]:
-    """The body of a seed, or the config's, and where it comes from.
+def get_body(config: Config, seed: int) -> tuple[Body, dict[str, object], dict[str, Any]]:
+    """The body of a seed, or the config's; where it comes from; arguments of its Simulation.
 
     Raises:
         InvalidArgumentError: a body without two feedback channels.
     """
+    given: dict[str, Any] = {"timestep": config.timestep}
     if config.body is None:
-        return draw_body(seed, config.settings), {"seed": seed, "settings": asdict(config.settings)}
-    model = load_model(body_path(config.body))
-    body = body_of_model(model)
-    if body.n_outputs != 2:
-        raise InvalidArgumentError("body", "2 feedback channels", body.n_outputs)
-    return body, provenance_of_model(model) or {}
+        source = {"seed": seed, "settings": asdict(config.settings)}
+        return draw_body(seed, config.settings), source, given
+    stored = open_body(config.body)
+    if stored.body.n_outputs != 2:
+        raise InvalidArgumentError("body", "2 feedback channels", stored.body.n_outputs)
+    names = ("integrator", "springs") if config.engine == "mujoco" else ()
+    return stored.body, stored.provenance, stored.take(*names, **given)
 
 
 def _of_body(config: Config, seed: int, wanted: Target, on_steps: OnSteps) -> BodyResult:
-    body, source = get_body(config, seed)
-    simulation = Simulation(body, timestep=config.timestep, engine=config.engine)
+    body, source, settings = get_body(config, seed)
+    simulation = Simulation(body, engine=config.engine, **settings)
     curve = [Phase(config.window, length_noise=std) for std in config.noise_curve]
     try:
         fit = teach(simulation, wanted, config.teaching, seed, on_steps=on_steps)

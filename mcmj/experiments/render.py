@@ -6,12 +6,11 @@ from pathlib import Path
 import numpy as np
 
 from mcmj.body import Body
-from mcmj.bodyfile import body_of_model, load_model, readout_of_model, readouts_of_model
 from mcmj.errors import InvalidArgumentError, TrajectoryFileError, UnknownNameError
 from mcmj.film import Film, Window
 from mcmj.gaits import NAMES, named_target
 from mcmj.lessons import Teaching
-from mcmj.library import body_path
+from mcmj.library import StoredBody, open_body
 from mcmj.phases import Phase, Schedule
 from mcmj.progress import OnSteps
 from mcmj.rendering import ORBIT_POINTS, Style
@@ -107,8 +106,9 @@ def run(config: Config, *, on_steps: OnSteps = lambda steps: None) -> Film:
     """
     if config.trajectory is not None:
         return _film_of_file(config, config.trajectory)
-    body, w_out, wanted = _find(config)
-    simulation = Simulation(body)
+    stored = open_body(config.body)
+    w_out, wanted = _find(config, stored)
+    simulation = Simulation(stored.body, **stored.take(*stored.settings))
     if w_out is None and wanted is not None:
         teach(simulation, wanted, Teaching(), config.seed, on_steps=on_steps)
         w_out = simulation.w_out
@@ -135,23 +135,22 @@ def _film_of_file(config: Config, path: Path) -> Film:
     return _film(config, body, trajectory, outputs, np.zeros(body.n_nodes), wanted, ())
 
 
-def _find(config: Config) -> tuple[Body, Array | None, Target | None]:
-    """The body, its readout if it has one, and the target: one of the two is there."""
-    model = load_model(body_path(config.body))
-    body, named = body_of_model(model), readouts_of_model(model)
+def _find(config: Config, stored: StoredBody) -> tuple[Array | None, Target | None]:
+    """The body's readout if it has one, and the target: one of the two is there."""
+    body, named = stored.body, stored.readouts
     if config.readout is not None and config.readout not in named:
         raise UnknownNameError("readout", config.readout, named)
     name = config.readout or config.task or next(iter(named), "")
     w_out = named[name] if named and name in named else None
     if w_out is None and not named:
-        w_out = readout_of_model(model)
+        w_out = stored.w_out
     task = config.task or (name if name in NAMES else None)
     if task is None and w_out is None:
         task = "van_der_pol"
     wanted = None if task is None else named_target(task)
     if wanted is not None and body.n_outputs != wanted.n_outputs:
         raise InvalidArgumentError("body", f"{wanted.n_outputs} outputs for {task}", body)
-    return body, w_out, wanted
+    return w_out, wanted
 
 
 def _film_of_run(

@@ -90,7 +90,7 @@ def run(config: Config, *, on_seeds: OnSteps = lambda seeds: None) -> Result:
     period = {name: np.full(config.seeds, np.inf) for name in TARGETS}
     for index in range(config.seeds):
         one = config.of_seed(config.first_seed + index)
-        for name, outcome in limit_cycle.run_tasks(one).items():
+        for name, outcome in limit_cycle.run_tasks(one, limit_cycle.get_body(one)).items():
             if not isinstance(outcome, DivergenceError):
                 orbit[name][index] = outcome.errors["orbit_error"]
                 period[name][index] = outcome.errors["period_error"]

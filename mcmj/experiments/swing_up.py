@@ -116,15 +116,11 @@ class SwingUp:
 
 @dataclass(frozen=True)
 class Result:
-    """All bodies, each a dictionary by task; the first is drawn."""
+    """The first body; the results of all, each a dictionary by task; the first is drawn."""
 
     config: Config
+    body: Body
     bodies: list[dict[str, SwingUp]]
-
-    @property
-    def body(self) -> Body:
-        """The first body."""
-        return limit_cycle.get_body(self.config.of_seed(0))[0]
 
     @property
     def readouts(self) -> dict[str, Array]:
@@ -194,16 +190,20 @@ def run(config: Config, *, on_steps: OnSteps = lambda steps: None) -> Result:
     """
     names = config.of_seed(0).tasks
     pairs = [(config.of_seed(index), name) for index in range(config.seeds) for name in names]
-    for one, name in pairs[: len(names)]:
-        limit_cycle.check_task(one, limit_cycle.get_body(one)[0], target(name))
+    first = pairs[0][0]
+    first_body, _, _ = limit_cycle.get_body(first)
+    for name in names:
+        limit_cycle.check_task(first, first_body, target(name))
 
     def work(pair: tuple[limit_cycle.Config, str], report: OnSteps) -> SwingUp:
         one, name = pair
-        body, _, _ = limit_cycle.get_body(one)
+        body = first_body if one == first else limit_cycle.get_body(one)[0]
         return _swing_up(config, body, target(name), one.noise_seed, report)
 
     runs = iter(in_threads(work, pairs, on_steps))
-    return Result(config, [dict(zip(names, runs, strict=False)) for _ in range(config.seeds)])
+    return Result(
+        config, first_body, [dict(zip(names, runs, strict=False)) for _ in range(config.seeds)]
+    )
 
 
 def _swing_up(config: Config, body: Body, wanted: Target, seed: int, on_steps: OnSteps) -> SwingUp:

@@ -7,11 +7,10 @@ import numpy as np
 
 from mcmj import metrics
 from mcmj.body import Body
-from mcmj.bodyfile import body_of_model, load_model, readout_of_model, readouts_of_model
 from mcmj.errors import InvalidArgumentError
 from mcmj.film import deformation_scale
 from mcmj.lessons import Teaching
-from mcmj.library import body_path
+from mcmj.library import open_body
 from mcmj.live import LiveLoop
 from mcmj.simulation import Simulation
 from mcmj.streams import stream
@@ -133,11 +132,11 @@ def run(config: Config) -> Result:
 
 def _body_and_readouts(config: Config) -> tuple[Body, dict[str, Array]]:
     """The file's readouts by name; taught ones if it has none."""
-    model = load_model(body_path(config.body))
-    body, readouts = body_of_model(model), readouts_of_model(model)
-    active = readout_of_model(model)
-    if not readouts and active is not None:
-        return body, {"readout": active}
+    stored = open_body(config.body)
+    stored.take()
+    body, readouts = stored.body, stored.readouts
+    if not readouts and stored.w_out is not None:
+        return body, {"readout": stored.w_out}
     if not readouts:
         for name in TARGETS:
             simulation = Simulation(body, engine="twin")

@@ -4,10 +4,9 @@ from dataclasses import dataclass, field
 from itertools import permutations
 
 from mcmj.body import Body
-from mcmj.bodyfile import body_of_model, load_model, readouts_of_model
 from mcmj.errors import InvalidArgumentError, UnknownNameError
 from mcmj.gaits import GAITS, LEGS
-from mcmj.library import body_path
+from mcmj.library import open_body
 from mcmj.quadruped import Quadruped
 from mcmj.validation import Array, require_count, require_names, require_number, require_timestep
 from mcmj.walker import PUSH_DURATION
@@ -109,8 +108,9 @@ def get_body(config: Config) -> tuple[Body, dict[str, Array]]:
     Raises:
         InvalidArgumentError, UnknownNameError: a body without one of them, or not four legs.
     """
-    model = load_model(body_path(config.body))
-    body, readouts = body_of_model(model), readouts_of_model(model)
+    stored = open_body(config.body)
+    stored.take(timestep=config.timestep)
+    body, readouts = stored.body, stored.readouts
     if body.n_outputs != len(LEGS):
         raise InvalidArgumentError("body", f"{len(LEGS)} feedback channels", body.n_outputs)
     for name in config.gaits:
