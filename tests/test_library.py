@@ -107,7 +107,7 @@ def test_a_command_shows_a_warning_in_one_line(tmp_path):
         *("--renderer", "matplotlib"),
     ]
     done = subprocess.run(command, capture_output=True, text=True, check=True)
-    assert done.stderr.splitlines() == [
+    assert done.stderr.strip().splitlines() == [
         "render: warning: the body file was written for springs mine; this run takes springs native"
     ]
 
