@@ -13,7 +13,7 @@ import numpy as np
 
 from mcmj.body import Body
 from mcmj.errors import InvalidArgumentError
-from mcmj.validation import Array, as_array, require_count
+from mcmj.validation import MOST_STEPS, Array, as_array, require_count
 
 
 @dataclass(frozen=True)
@@ -89,7 +89,7 @@ def _common_length(steps: int | None, arrays: dict[str, Array | None], *, consta
                 "steps", "a number of steps, or inputs, offset or forces over time", None
             )
         steps = next(iter(lengths.values()))
-    require_count("steps", steps, 1)
+    require_count("steps", steps, 1, MOST_STEPS)
     for name, length in lengths.items():
         if length != steps:
             raise InvalidArgumentError(name, f"{steps} rows, one a step", length)

@@ -9,7 +9,7 @@ from mcmj.errors import InvalidArgumentError, UnknownNameError
 from mcmj.leapfrog import LEAPFROG
 from mcmj.mjcf import INTEGRATORS
 from mcmj.options import DEFAULT_INTEGRATOR
-from mcmj.validation import Array, require_number
+from mcmj.validation import Array, require_duration, require_number, require_timestep
 
 ACTIONS, STARTS = ("inputs", "offsets", "both"), ("rest", "cycle")
 
@@ -54,7 +54,9 @@ class Setting:
         for name, valid in choices.items():
             if getattr(self, name) not in valid:
                 raise UnknownNameError(name, getattr(self, name), valid)
-        for name in ("input_limit", "offset_limit", "timestep", "time_limit", "good", "margin"):
+        require_timestep("timestep", self.timestep)
+        require_duration("time_limit", self.time_limit, self.timestep)
+        for name in ("input_limit", "offset_limit", "good", "margin"):
             require_number(name, getattr(self, name), 0.0, open_low=True)
         require_number("kick", self.kick, 0.0)
         require_number("gate", self.gate, 0.0)

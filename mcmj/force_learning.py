@@ -22,7 +22,7 @@ from mcmj.streams import stream
 from mcmj.targets import Target
 from mcmj.trunk import N_MUSCLES
 from mcmj.trunk_walker import TrunkWalker
-from mcmj.validation import Array, require_count, require_number
+from mcmj.validation import Array, require_count, require_duration, require_number
 
 RAMP = 1.0  # s over which a teacher begins
 
@@ -64,6 +64,8 @@ class ForceLearning:
             if field.name != "rounds":
                 low_open = field.name != "noise"
                 require_number(field.name, getattr(self, field.name), 0.0, open_low=low_open)
+        for name in ("warm_up", "round_duration", "trial"):
+            require_duration(name, getattr(self, name))
         for name in ("round_duration", "trial"):
             require_number(name, getattr(self, name), 1.0)
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from mcmj.errors import InvalidArgumentError
 from mcmj.simulation import Simulation
-from mcmj.validation import Array, require_count, require_number
+from mcmj.validation import Array, require_count, require_duration, require_number
 
 Signal = Callable[[Array], Array]  # times (T,) [s] -> (T, n)
 
@@ -43,14 +43,14 @@ class Teaching:
     rest_weight: float = 1e-3
 
     def __post_init__(self) -> None:
-        require_number("duration", self.duration, 0.0, open_low=True)
+        require_duration("duration", self.duration)
         require_washout(self.washout, self.duration)
         for name in ("noise", "length_noise", "ridge_per_row"):
             require_number(name, getattr(self, name), 0.0)
         require_count("every", self.every, 1, 1000)
         require_count("rest_runs", self.rest_runs, 0)
-        for name in ("rest_duration", "rest_weight"):
-            require_number(name, getattr(self, name), 0.0, open_low=True)
+        require_duration("rest_duration", self.rest_duration)
+        require_number("rest_weight", self.rest_weight, 0.0, open_low=True)
 
     @property
     def total(self) -> float:

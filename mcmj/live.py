@@ -15,7 +15,7 @@ from mcmj.errors import InvalidArgumentError, UnknownNameError
 from mcmj.mjcf import checked_readout, to_mjcf
 from mcmj.quiet import quiet_warnings
 from mcmj.trajectory import State
-from mcmj.validation import Array, require_count, require_number
+from mcmj.validation import MOST_STEPS, Array, require_count, require_number
 
 
 class LiveLoop:
@@ -99,7 +99,7 @@ class LiveLoop:
 
     def advance(self, steps: int, forces: Array | None = None) -> None:
         """Do steps, with constant forces (N, 2) on the nodes [N]."""
-        require_count("steps", steps, 1)
+        require_count("steps", steps, 1, MOST_STEPS)
         laws.install()
         pushed = 0.0 if forces is None else forces[self.body.free]
         self._data.xfrc_applied[self._bodies, :2] = pushed

@@ -17,7 +17,7 @@ from mcmj.alteration import checked_cut, checked_masses
 from mcmj.body import Body
 from mcmj.errors import InvalidArgumentError
 from mcmj.mjcf import checked_readout
-from mcmj.validation import as_array, require_count, require_number
+from mcmj.validation import as_array, require_count, require_duration, require_number
 
 
 @dataclass(frozen=True)
@@ -62,7 +62,7 @@ class Phase:
     name: str = ""
 
     def __post_init__(self) -> None:
-        require_number("duration", self.duration, 0.0, open_low=True)
+        require_duration("duration", self.duration)
         require_number("length_noise", self.length_noise, 0.0)
         for name in ("freeze", "cut"):
             numbers = getattr(self, name)

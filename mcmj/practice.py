@@ -22,7 +22,7 @@ from mcmj.readout import Fit
 from mcmj.simulation import Simulation
 from mcmj.targets import Target
 from mcmj.teaching import Course
-from mcmj.validation import Array, require_count, require_number
+from mcmj.validation import Array, require_count, require_duration, require_number
 
 Judge = Callable[[Array], float]
 
@@ -54,9 +54,10 @@ class Practice:
     def __post_init__(self) -> None:
         require_count("rounds", self.rounds, 0)
         require_count("round_runs", self.round_runs, 1)
-        for name in ("round_duration", "round_weight", "good_enough"):
+        for name in ("round_weight", "good_enough"):
             require_number(name, getattr(self, name), 0.0, open_low=True)
-        require_number("trial", self.trial, 0.0, open_low=True)
+        for name in ("round_duration", "trial"):
+            require_duration(name, getattr(self, name))
         require_number("trial_window", self.trial_window, 0.0, open_low=True)
         if self.trial_window >= self.trial:
             raise InvalidArgumentError(

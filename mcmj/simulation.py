@@ -24,7 +24,7 @@ from mcmj.options import DEFAULT_INTEGRATOR, Options
 from mcmj.spring_laws import SpringLaw
 from mcmj.steplimit import warn_if_unstable
 from mcmj.trajectory import RECORDABLE, State, Trajectory, join
-from mcmj.validation import Array, as_array, require_count
+from mcmj.validation import MOST_STEPS, Array, as_array, require_count
 
 CHUNK = 16384  # control steps at a time in C: 8 MB of lengths at 61 springs
 
@@ -204,7 +204,7 @@ class Simulation:
         for name in record:
             if name not in RECORDABLE:
                 raise UnknownNameError("record", name, RECORDABLE)
-        require_count("chunk", chunk, 1)
+        require_count("chunk", chunk, 1, MOST_STEPS)
         drive = check_drive(
             self.body,
             steps=steps,

@@ -3,7 +3,7 @@
 import numpy as np
 
 from mcmj.errors import UnknownNameError
-from mcmj.validation import require_count
+from mcmj.validation import require_seed
 
 # the order is part of every result: only append
 PURPOSES = (
@@ -41,7 +41,7 @@ def stream(seed: int, purpose: str) -> np.random.Generator:
         InvalidArgumentError: the seed is not an integer >= 0.
         UnknownNameError: not one of PURPOSES.
     """
-    require_count("seed", seed, 0)
+    require_seed("seed", seed)
     if purpose not in PURPOSES:
         raise UnknownNameError("random stream", purpose, PURPOSES)
     child = np.random.SeedSequence(seed, spawn_key=(PURPOSES.index(purpose),))

@@ -10,7 +10,7 @@ from scipy.integrate import solve_ivp
 from scipy.interpolate import CubicSpline
 
 from mcmj.errors import InvalidArgumentError, McmjError, UnknownNameError
-from mcmj.validation import Array, as_array, require_count, require_number
+from mcmj.validation import MOST_STEPS, Array, as_array, require_count, require_number
 
 RTOL, ATOL = 1e-10, 1e-12  # a target must be far more exact than any readout
 
@@ -109,7 +109,7 @@ def from_array(name: str, values: npt.ArrayLike, timestep: float) -> Target:
         InvalidArgumentError: fewer than 4 samples, wrong shape, or NaN.
     """
     samples = as_array("values", values, (None, None))
-    require_count("number of samples", len(samples), 4)
+    require_count("number of samples", len(samples), 4, MOST_STEPS)
     require_number("timestep", timestep, 0.0, open_low=True)
     knots = np.arange(len(samples) + 1) * timestep
     spline = CubicSpline(knots, np.vstack([samples, samples[:1]]), bc_type="periodic")

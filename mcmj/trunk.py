@@ -19,7 +19,7 @@ import numpy.typing as npt
 from mcmj.body import Body
 from mcmj.errors import InvalidArgumentError
 from mcmj.gaits import LEGS, POINTS, gait_target
-from mcmj.generator import Range, delaunay_springs, log_uniform
+from mcmj.generator import MOST_NODES, Range, delaunay_springs, log_uniform
 from mcmj.legs import lift_of
 from mcmj.streams import stream
 from mcmj.targets import Target, from_array
@@ -76,7 +76,7 @@ class TrunkSettings:
     lift: float = 0.07
 
     def __post_init__(self) -> None:
-        require_count("nodes", self.nodes, 7)
+        require_count("nodes", self.nodes, 7, MOST_NODES)
         for field in fields(self):
             if field.name in ("k1", "k3", "d1", "d3"):
                 require_range(field.name, getattr(self, field.name))

@@ -7,6 +7,9 @@ import numpy.typing as npt
 
 from mcmj.errors import InvalidArgumentError, UnknownNameError
 
+MOST_COUNT = 10**6  # of anything that no other limit is given for
+MOST_STEPS = 10**9  # of one run
+LARGEST_SEED = 2**128 - 1  # as much as NumPy's own
 SHORTEST_STEP = 1e-9  # s: below, rounding of the state exceeds what a step changes
 Array = npt.NDArray[np.float64]
 
@@ -75,11 +78,28 @@ def require_timestep(name: str, value: float) -> None:
     require_number(name, value, SHORTEST_STEP)
 
 
-def require_count(name: str, value: int, low: int, high: int | None = None) -> None:
-    """Raise unless value is an integer >= low, and <= high if there is one."""
+def require_duration(
+    name: str, value: float, timestep: float = 1e-3, *, open_low: bool = True
+) -> None:
+    """Raise unless value [s] is above 0 (or 0, if not open_low), and at most MOST_STEPS steps."""
+    require_number(name, value, 0.0, open_low=open_low)
+    if value > MOST_STEPS * timestep:
+        raise InvalidArgumentError(
+            name, f"at most {MOST_STEPS} steps of {timestep:g} s", f"{value:g} s"
+        )
+
+
+def require_seed(name: str, value: int) -> None:
+    """Raise unless value is an integer from 0 to LARGEST_SEED."""
+    require_count(name, value, 0, LARGEST_SEED)
+
+
+def require_count(name: str, value: int, low: int, high: int = MOST_COUNT) -> None:
+    """Raise unless value is an integer in [low, high]."""
     whole = isinstance(value, int | np.integer) and not isinstance(value, bool)
-    if not whole or value < low or (high is not None and value > high):
-        wanted = f"an integer >= {low}" if high is None else f"an integer in [{low}, {high}]"
+    if not whole or not low <= value <= high:
+        at_most = f" and at most {high}" if whole and value > high else ""
+        wanted = f"an integer >= {low}{at_most}"
         raise InvalidArgumentError(name, wanted, repr(value))
 
 

@@ -21,7 +21,7 @@ from mcmj.quadruped import Quadruped
 from mcmj.quiet import quiet_warnings
 from mcmj.trajectory import State
 from mcmj.units import rescaled, rescaled_readout
-from mcmj.validation import Array, as_array, require_count, require_number
+from mcmj.validation import MOST_STEPS, Array, as_array, require_count, require_number
 from mcmj.walklaw import COMMANDS, actuators_of, leg_law
 from mcmj.walkmetrics import Walk
 from mcmj.walkscene import LEG_SENSORS, ROBOT, Terrain, walking_model
@@ -166,7 +166,7 @@ class Walker:
         require_number("sample", sample, 0.0, open_low=True)
         stride = max(1, round(sample / self.timestep))
         count = round(duration / (stride * self.timestep))
-        require_count("duration / sample", count, 1)
+        require_count("duration / sample", count, 1, MOST_STEPS)
         force = self._batch.bind("xfrc_applied")[:, self.model.body(ROBOT + "trunk").id]
         pushed = round(PUSH_DURATION / (stride * self.timestep))
         given = np.broadcast_to(np.asarray(0.0 if push is None else push), (self.copies, 2))

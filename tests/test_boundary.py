@@ -4,22 +4,67 @@ import time
 
 import pytest
 
+from mcmj.environment_setting import Setting
 from mcmj.errors import McmjError
 from mcmj.experiments import (
+    benchmark_config,
+    capacity,
+    certify_config,
+    drive,
+    emulate,
+    filters,
     gaits_config,
     guided,
+    hard_cases,
     input_driven_config,
     limit_cycle_config,
     linearise,
+    perturb,
+    prune,
+    render,
     search,
+    speed_accuracy,
+    success_rate,
+    swing_up,
+    switching,
+    trunk_config,
     walk_config,
-)
+)  # fmt: skip
 from mcmj.generator import BodySettings, random_body
 from mcmj.lessons import Teaching
+from mcmj.phases import Phase
+from mcmj.practice import Practice
 from mcmj.simulation import Simulation
+from mcmj.trunk import TrunkSettings
 
 LIMIT_CYCLE = limit_cycle_config.Config
 TIMED = (gaits_config, input_driven_config, limit_cycle_config, linearise, walk_config)
+ABSURD = {  # in the default settings otherwise
+    capacity: {
+        "symbols": 10**9,
+        "streams": 10**9,
+        "sizes": (10**9,),
+        "hold": 1e9,
+        "threads": 10**9,
+    },
+    drive: {"nodes": 10**9, "population": 10**9, "control_timestep": 1e-300, "time_limit": 1e12},
+    emulate: {"horizon": 1e12, "steps_ms": (1.0, 1e-300), "seed": 10**60},
+    filters: {"train": 1e12, "symbols": 10**9, "taps": 10**9, "seed": -1},
+    speed_accuracy: {"horizons": (1e12,), "repeats": 10**9, "steps_ms": (0.0,)},
+    trunk_config: {"walking": 1e12, "teaching": 1e12, "pushes": 10**9},
+    benchmark_config: {"sizes": (10**9,), "nodes": 10**9, "memory_steps": 10**12, "repeats": 10**9},
+    perturb: {"timestep": 1e-320, "before": 1e12, "seeds": 10**9},
+    success_rate: {"seeds": 10**9, "free_run": 1e12},
+    certify_config: {"free_run": 1e12, "copies": 10**9},
+    gaits_config: {"before": 1e12, "phases": 10**9},
+    input_driven_config: {"free_run": 1e12, "sweep": 1e12},
+    linearise: {"train": 1e12, "sizes": (10**9,)},
+    walk_config: {"walking": 1e12, "settle": 1e12, "moments": 10**9},
+    render: {"duration": 1e12, "stills": 10**9},
+    hard_cases: {"duration": 1e12, "most_steps": 10**9},
+    swing_up: {"free_run": 1e12, "kicks": 10**9},
+    prune: {"free_run": 1e12, "starts": 10**9},
+}
 CASES = [
     ("body", lambda: limit_cycle_config.get_body(LIMIT_CYCLE(body=""))),
     ("body", lambda: gaits_config.get_body(gaits_config.Config(body=""), 0)),
@@ -37,6 +82,21 @@ CASES = [
     ("first_seed", lambda: search.Config(first_seed=10**30)),
     ("experiment", lambda: search.Config(experiment="../x")),
     ("bodies", lambda: guided.Config(bodies=10**9)),
+    *[
+        (name, lambda m=module, n=name, v=value: m.Config(**{n: v}))
+        for module, given in ABSURD.items()
+        for name, value in given.items()
+    ],
+    ("switch_nodes", lambda: switching.SwitchConfig(switch_nodes=10**9)),
+    ("exam", lambda: switching.SwitchConfig(exam=1e12)),
+    ("nodes", lambda: TrunkSettings(nodes=10**9)),
+    ("time_limit", lambda: Setting(time_limit=1e12)),
+    ("rest_runs", lambda: Teaching(rest_runs=10**9)),
+    ("duration", lambda: Teaching(duration=1e12)),
+    ("trial", lambda: Practice(trial=1e12)),
+    ("duration", lambda: Phase(1e12)),
+    ("at most 1000000000 steps of 1e-09 s", lambda: LIMIT_CYCLE(timestep=1e-9)),
+    ("steps", lambda: Simulation(random_body(0)).rollout(10**12)),
     ("hook", lambda: Simulation(random_body(0)).rollout(1, hook=3)),
     ("hook's forces", lambda: Simulation(random_body(0)).rollout(1, hook=lambda t, x: [1.0])),
 ]

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from mcmj.body import Body
-from mcmj.errors import InvalidArgumentError
-from mcmj.validation import Array, require_count
+from mcmj.generator import MOST_NODES
+from mcmj.validation import MOST_STEPS, Array, require_count, require_seed
 
 READOUT_SIZE = 1e-4  # small weights: what they are costs nothing, and the loop stays quiet
 
@@ -32,10 +32,14 @@ class Config:
     memory_steps: int = 1_000_000
 
     def __post_init__(self) -> None:
-        for name, low in (("nodes", 3), ("steps", 10), ("repeats", 1), ("memory_steps", 0)):
-            require_count(name, getattr(self, name), low)
-        if not self.sizes or min(self.sizes) < 3:
-            raise InvalidArgumentError("sizes", "numbers of nodes >= 3", self.sizes)
+        require_count("steps", self.steps, 10)
+        require_count("repeats", self.repeats, 1)
+        require_seed("seed", self.seed)
+        require_count("memory_steps", self.memory_steps, 0, MOST_STEPS)
+        require_count("number of sizes", len(self.sizes), 1)
+        for name, sizes in (("nodes", (self.nodes,)), ("sizes", self.sizes)):
+            for size in sizes:
+                require_count(name, size, 3, MOST_NODES)
 
 
 def small_readout(body: Body) -> Array:

@@ -16,12 +16,12 @@ from mcmj.body import Body
 from mcmj.capacity import Capacities, generalisation_rank, kernel_rank, processing_capacity
 from mcmj.ensemble import Ensemble
 from mcmj.errors import DivergenceError, InvalidArgumentError
-from mcmj.generator import BodySettings, draw_body
+from mcmj.generator import MOST_NODES, BodySettings, draw_body
 from mcmj.mjcf import DEFAULT_INTEGRATOR
 from mcmj.probing import held_states
 from mcmj.simulation import Simulation
 from mcmj.streams import stream
-from mcmj.validation import Array, require_count, require_number
+from mcmj.validation import Array, require_count, require_duration, require_number, require_seed
 
 TIMESTEP = 1e-3  # s
 MEASURES = ("memory_capacity", "ipc_total", "kernel_rank", "generalisation_rank")
@@ -85,6 +85,11 @@ class Config:
         for name in ("hold", "strength", "resolution"):
             require_number(name, getattr(self, name), 0.0, open_low=True)
         require_count("shared", self.shared, 0)
+        require_duration("hold", self.hold)
+        require_seed("seed", self.seed)
+        for name in ("symbols", "map_symbols", "streams"):
+            length = self.stream_symbols if name == "streams" else 1
+            require_duration(f"{name} x hold", getattr(self, name) * length * self.hold)
         if self.shared >= self.stream_symbols:
             raise InvalidArgumentError(
                 "shared", f"fewer than the {self.stream_symbols} symbols of a stream", self.shared
@@ -93,7 +98,7 @@ class Config:
             for value in getattr(self, name):
                 require_number(name, value, 0.0, open_low=True)
         for n in self.sizes:
-            require_count("sizes", n, 3)
+            require_count("sizes", n, 3, MOST_NODES)
 
     @property
     def hold_steps(self) -> int:

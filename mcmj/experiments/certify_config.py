@@ -7,7 +7,14 @@ from mcmj.errors import UnknownNameError
 from mcmj.experiments import limit_cycle
 from mcmj.lessons import Teaching
 from mcmj.targets import TARGETS, target
-from mcmj.validation import as_array, require_above, require_count, require_number
+from mcmj.validation import (
+    as_array,
+    require_above,
+    require_count,
+    require_duration,
+    require_number,
+    require_seed,
+)
 
 
 @dataclass(frozen=True)
@@ -55,7 +62,9 @@ class Config:
         for name in ("threshold", "diffusion_noise"):
             require_number(name, getattr(self, name), 0.0, open_low=True)
         if self.seed is not None:
-            require_count("seed", self.seed, 0)
+            require_seed("seed", self.seed)
+        for name in ("free_run", "recovery"):
+            require_duration(name, getattr(self, name))
         period = target(self.task).period
         require_number("window", self.window, metrics.PERIODS_NEEDED * period, self.free_run)
         require_number("recovery", self.recovery, 3 * period)

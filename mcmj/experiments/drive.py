@@ -15,14 +15,14 @@ from mcmj import metrics
 from mcmj.body import Body
 from mcmj.environment_setting import Setting
 from mcmj.errors import UnknownNameError
-from mcmj.generator import random_body
+from mcmj.generator import MOST_NODES, random_body
 from mcmj.lessons import Teaching
 from mcmj.progress import OnSteps
 from mcmj.simulation import Simulation
 from mcmj.streams import stream
 from mcmj.targets import TARGETS, Target, target
 from mcmj.teaching import teach
-from mcmj.validation import Array, require_count, require_number
+from mcmj.validation import Array, require_count, require_duration, require_number, require_seed
 
 if TYPE_CHECKING:
     from mcmj.environment import Environment
@@ -64,11 +64,15 @@ class Config:
         if self.task not in TARGETS:
             raise UnknownNameError("task", self.task, TARGETS)
         require_count("knots", self.knots, 1)
+        require_count("nodes", self.nodes, 3, MOST_NODES)
+        require_seed("seed", self.seed)
+        require_duration("time_limit", self.time_limit)
         require_count("rounds", self.rounds, 1)
         require_count("elites", self.elites, 2)
         require_count("population", self.population, self.elites)
         require_number("drive", self.drive, 0.0, self.time_limit, open_low=True)
-        for name in ("input_limit", "spread", "control_timestep"):
+        require_number("control_timestep", self.control_timestep, 1e-3)
+        for name in ("input_limit", "spread"):
             require_number(name, getattr(self, name), 0.0, open_low=True)
         require_number("least_spread", self.least_spread, 0.0)
 

@@ -28,7 +28,7 @@ from mcmj.experiments.emulated_systems import SYSTEMS, System, mismatched, syste
 from mcmj.experiments.orders import Order, observed_order
 from mcmj.mjcf import INTEGRATORS
 from mcmj.simulation import Simulation
-from mcmj.validation import Array, require_number
+from mcmj.validation import SHORTEST_STEP, Array, require_duration, require_number, require_seed
 
 REPORTED = 1.0  # ms: the step of the errors in metrics.json
 RTOL = 1e-13
@@ -64,9 +64,10 @@ class Config:
             for name in names:
                 if name not in valid:
                     raise UnknownNameError(kind, name, valid)
-        require_number("horizon", self.horizon, 0.0, open_low=True)
+        require_seed("seed", self.seed)
         for step in self.steps_ms:
-            require_number("steps_ms", step, 0.0, open_low=True)
+            require_number("steps_ms", step, 1e3 * SHORTEST_STEP)
+            require_duration("horizon", self.horizon, 1e-3 * step)
             count = 1e3 * self.horizon / step
             if abs(count - round(count)) > 1e-9:
                 raise InvalidArgumentError(

@@ -19,7 +19,7 @@ from mcmj.probing import held_states
 from mcmj.readout import fit_readout
 from mcmj.simulation import Simulation
 from mcmj.streams import stream
-from mcmj.validation import Array, require_count, require_number
+from mcmj.validation import Array, require_count, require_duration, require_number, require_seed
 
 SAMPLED = ("volterra", "toolbox_narma")  # one input a millisecond
 IN_SYMBOLS = ("narma10", "delayed_recall")  # which share their input, and so one run
@@ -83,10 +83,14 @@ class Config:
         for name in self.tasks:
             if name not in TASKS:
                 raise UnknownNameError("task", name, TASKS)
-        for name in ("train", "washout", "test", "hold", "gain", "volterra_gain"):
+        require_seed("seed", self.seed)
+        for name in ("train", "washout", "test", "hold"):
+            require_duration(name, getattr(self, name))
+        for name in ("gain", "volterra_gain"):
             require_number(name, getattr(self, name), 0.0, open_low=True)
         for name in ("symbols", "washout_symbols", "test_symbols", "delay", "taps"):
             require_count(name, getattr(self, name), 1)
+            require_duration(f"{name} x hold", getattr(self, name) * self.hold)
         if self.train + self.test > REPEAT:
             raise InvalidArgumentError(
                 "train", f"train + test <= {REPEAT:g} s, after which the input comes back",

@@ -11,7 +11,14 @@ from mcmj.generator import BodySettings, draw_body
 from mcmj.lessons import Teaching
 from mcmj.library import open_body
 from mcmj.practice import Practice
-from mcmj.validation import Array, require_count, require_number, require_timestep
+from mcmj.validation import (
+    Array,
+    require_count,
+    require_duration,
+    require_number,
+    require_seed,
+    require_timestep,
+)
 
 # the default body with all its motion 1.5 times faster, for a walk's swing is fast: stiffness and
 # forces x 1.5^2, d1 x 1.5, d3 / 1.5; chosen, like the teaching, on bodies of seeds 100 to 119
@@ -72,12 +79,14 @@ class Config:
         if not self.gaits or len(set(self.gaits)) < len(self.gaits):
             raise InvalidArgumentError("gaits", "at least one, each once", self.gaits)
         if self.seed is not None:
-            require_count("seed", self.seed, 0)
+            require_seed("seed", self.seed)
         require_count("seeds", self.seeds, 1)
         require_count("phases", self.phases, 1)
-        for name in ("before", "tolerance", "window"):
+        for name in ("tolerance", "window"):
             require_number(name, getattr(self, name), 0.0, open_low=True)
         require_timestep("timestep", self.timestep)
+        for name in ("before", "free_run", "after", "from_rest"):
+            require_duration(name, getattr(self, name), self.timestep)
         for name in ("free_run", "after", "from_rest"):
             require_number(name, getattr(self, name), self.window)
         if self.body is not None and (self.settings != DRAWN or self.seeds > 1):

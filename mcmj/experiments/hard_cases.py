@@ -24,7 +24,7 @@ from mcmj.mjcf import INTEGRATORS
 from mcmj.progress import OnSteps
 from mcmj.simulation import Simulation
 from mcmj.steplimit import stability_limit
-from mcmj.validation import Array, require_count, require_number
+from mcmj.validation import Array, require_count, require_duration, require_number, require_seed
 
 OVERSHOOT = 10.0
 LEAST_STEPS = 400  # of a run: time for a slow growth
@@ -53,9 +53,9 @@ class Config:
     precision: float = 0.03
 
     def __post_init__(self) -> None:
-        require_count("seed", self.seed, 0)
+        require_seed("seed", self.seed)
         require_count("most_steps", self.most_steps, 100)
-        require_number("duration", self.duration, 0.0, open_low=True)
+        require_duration("duration", self.duration)
         require_number("precision", self.precision, 0.0, 1.0, open_low=True)
         if not self.cases:
             object.__setattr__(self, "cases", tuple(CASES))

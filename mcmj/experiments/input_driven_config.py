@@ -11,7 +11,14 @@ from mcmj.lessons import Teaching
 from mcmj.library import open_body
 from mcmj.practice import Practice
 from mcmj.profiles import Profile, Ramp, hold
-from mcmj.validation import Array, require_count, require_number, require_timestep
+from mcmj.validation import (
+    Array,
+    require_count,
+    require_duration,
+    require_number,
+    require_seed,
+    require_timestep,
+)
 
 SYSTEM = QUADRATIC
 PROFILES = {
@@ -80,14 +87,14 @@ class Config:
     practice: Practice = PRACTICE
 
     def __post_init__(self) -> None:
-        require_count("seed", self.seed, 0)
+        require_seed("seed", self.seed)
         require_count("seeds", self.seeds, 1)
         require_count("phases", self.phases, 1)
-        for name in ("free_run", "tolerance"):
-            require_number(name, getattr(self, name), 0.0, open_low=True)
+        require_number("tolerance", self.tolerance, 0.0, open_low=True)
         require_timestep("timestep", self.timestep)
+        require_duration("free_run", self.free_run, self.timestep)
         for name in ("run_in", "sweep"):
-            require_number(name, getattr(self, name), 0.0)
+            require_duration(name, getattr(self, name), self.timestep, open_low=False)
         require_number("window", self.window, 0.0, self.free_run, open_low=True)
         if not self.inputs:
             raise InvalidArgumentError("inputs", "at least one", self.inputs)

@@ -11,7 +11,7 @@ from mcmj.lessons import Teaching
 from mcmj.library import open_body
 from mcmj.options import DEFAULT_INTEGRATOR, ENGINES
 from mcmj.targets import TARGETS, Target, target
-from mcmj.validation import Array, require_number, require_timestep
+from mcmj.validation import Array, require_duration, require_number, require_timestep
 
 Found = tuple[Body, dict[str, Array], dict[str, object]]  # what get_body gives
 
@@ -55,7 +55,7 @@ class Config:
         if self.task not in (*TARGETS, "all"):
             raise UnknownNameError("task", self.task, [*TARGETS, "all"])
         require_timestep("timestep", self.timestep)
-        require_number("free_run", self.free_run, 0.0, open_low=True)
+        require_duration("free_run", self.free_run, self.timestep)
         require_number("window", self.window, 0.0, self.free_run, open_low=True)
         if self.windows != 0.0:
             longest = max(target(name).period for name in self.tasks)

@@ -18,7 +18,7 @@ from mcmj.readout import fit_readout
 from mcmj.simulation import Simulation
 from mcmj.streams import stream
 from mcmj.theory import Linearisability
-from mcmj.validation import Array, require_count, require_number, require_timestep
+from mcmj.validation import Array, require_count, require_duration, require_number, require_timestep
 
 PUSH = 100.0  # N per unit input
 
@@ -60,9 +60,9 @@ class Config:
                 require_count(name, n, 1)
         for value in self.diversities:
             require_number("diversities", value, 0.0, 10.0, open_low=True)
-        for name in ("train", "washout", "test"):
-            require_number(name, getattr(self, name), 0.0, open_low=True)
         require_timestep("timestep", self.timestep)
+        for name in ("train", "washout", "test"):
+            require_duration(name, getattr(self, name), self.timestep)
         require_number("length_noise", self.length_noise, 0.0)
         require_count("symbolic_masses", self.symbolic_masses, 1)
 

@@ -18,7 +18,14 @@ from mcmj.schedule import Phase, RandomForces, Schedule, run_schedule
 from mcmj.simulation import Simulation
 from mcmj.targets import TARGETS, Target, target
 from mcmj.teaching import Teaching, teach
-from mcmj.validation import Array, require_count, require_number
+from mcmj.validation import (
+    Array,
+    require_count,
+    require_duration,
+    require_number,
+    require_seed,
+    require_timestep,
+)
 
 # what a search over many bodies leaves out, see mcmj.search.experiment
 SEARCH_DEFAULTS = {"noise_curve": ()}
@@ -76,9 +83,12 @@ class Config:
     def __post_init__(self) -> None:
         if self.task not in TARGETS:
             raise UnknownNameError("task", self.task, TARGETS)
-        require_count("seed", self.seed, 0)
+        require_seed("seed", self.seed)
         require_count("seeds", self.seeds, 1)
-        for name in ("before", "window", "after", "force", "sensor_noise", "tolerance"):
+        require_timestep("timestep", self.timestep)
+        for name in ("before", "window", "after"):
+            require_duration(name, getattr(self, name), self.timestep)
+        for name in ("force", "sensor_noise", "tolerance"):
             require_number(name, getattr(self, name), 0.0, open_low=True)
         require_number("error_window", self.error_window, 0.0, self.after, open_low=True)
         for std in self.noise_curve:

@@ -21,7 +21,7 @@ from mcmj.targets import Target
 from mcmj.teaching import synchronise, teach
 from mcmj.trajectory import Trajectory, join
 from mcmj.trajectory_file import load_trajectory
-from mcmj.validation import Array, require_count, require_number
+from mcmj.validation import Array, require_count, require_duration, require_number
 
 FORMATS = ("mp4", "gif", "png")
 
@@ -75,7 +75,7 @@ class Config:
 
     def __post_init__(self) -> None:
         for name in ("duration", "before", "during", "after"):
-            require_number(name, getattr(self, name), 0.0, open_low=True)
+            require_duration(name, getattr(self, name))
         for name in ("forces", "length_noise", "kick"):
             require_number(name, getattr(self, name), 0.0)
         for output in self.freeze:

@@ -22,7 +22,14 @@ from mcmj.reference import integrate
 from mcmj.streams import stream
 from mcmj.timing import interleaved_seconds
 from mcmj.trajectory import State
-from mcmj.validation import Array, require_count, require_number
+from mcmj.validation import (
+    SHORTEST_STEP,
+    Array,
+    require_count,
+    require_duration,
+    require_number,
+    require_seed,
+)
 
 TOOLBOX = {"d1": (0.1, 2.0)}
 BODIES: dict[str, Callable[[int], Body]] = {
@@ -74,11 +81,14 @@ class Config:
             for name in names:
                 if name not in valid:
                     raise UnknownNameError(kind, name, valid)
+        require_seed("seed", self.seed)
         require_number("speed", self.speed, 0.0)
         require_number("force", self.force, 0.0)
         require_count("repeats", self.repeats, 1)
         for step in self.steps_ms:
+            require_number("steps_ms", step, 1e3 * SHORTEST_STEP)
             for horizon in self.horizons:
+                require_duration("horizons", horizon, 1e-3 * step)
                 if abs(horizon * 1e3 / step - round(horizon * 1e3 / step)) > 1e-9:
                     raise InvalidArgumentError(
                         "steps_ms", f"divisors of the horizon {horizon:g} s", f"{step:g} ms"

@@ -11,7 +11,7 @@ from mcmj.lessons import Teaching
 from mcmj.progress import OnSteps
 from mcmj.rates import success_rate
 from mcmj.targets import TARGETS
-from mcmj.validation import Array, require_count, require_number
+from mcmj.validation import Array, require_count, require_duration, require_number, require_seed
 
 
 @dataclass(frozen=True)
@@ -38,7 +38,9 @@ class Config:
 
     def __post_init__(self) -> None:
         require_count("seeds", self.seeds, 1)
-        require_count("first_seed", self.first_seed, 0)
+        require_seed("first_seed", self.first_seed)
+        require_duration("free_run", self.free_run)
+        require_number("window", self.window, 0.0, self.free_run, open_low=True)
         require_number("threshold", self.threshold, 0.0, open_low=True)
 
     def of_seed(self, seed: int) -> limit_cycle.Config:

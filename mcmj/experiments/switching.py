@@ -12,11 +12,11 @@ import numpy as np
 from mcmj import metrics
 from mcmj.body import Body
 from mcmj.filter_tasks import FilterTask, smooth_noise, switch
-from mcmj.generator import random_body
+from mcmj.generator import MOST_NODES, random_body
 from mcmj.readout import Regression
 from mcmj.simulation import Simulation
 from mcmj.streams import stream
-from mcmj.validation import Array, require_count, require_number, require_range
+from mcmj.validation import Array, require_count, require_duration, require_number, require_range
 
 TIMESTEP = 1e-3  # s
 WASHOUT = 5.0  # s, of the lesson
@@ -51,12 +51,12 @@ class SwitchConfig:
 
     def __post_init__(self) -> None:
         for name in ("pulse", "lesson", "exam", "noise_time"):
-            require_number(name, getattr(self, name), 0.0, open_low=True)
+            require_duration(name, getattr(self, name), TIMESTEP)
         for name in ("noise", "ridge_per_row"):
             require_number(name, getattr(self, name), 0.0)
         for name in ("train_pauses", "test_pauses"):
             require_range(name, getattr(self, name))
-        require_count("switch_nodes", self.switch_nodes, 3)
+        require_count("switch_nodes", self.switch_nodes, 3, MOST_NODES)
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,13 @@ from mcmj.force_learning import ForceLearning
 from mcmj.gaits import GAITS
 from mcmj.trunk import TrunkSettings
 from mcmj.trunk_walker import PUSH_DURATION
-from mcmj.validation import require_count, require_names, require_number
+from mcmj.validation import (
+    require_count,
+    require_duration,
+    require_names,
+    require_number,
+    require_seed,
+)
 
 PARTS = ("regression", "rest", "push", "switch", "steps")
 
@@ -54,11 +60,12 @@ class Config:
         require_names("gait", self.gaits, GAITS)
         if self.parts:
             require_names("part", self.parts, PARTS)
-        require_count("seed", self.seed, 0)
+        require_seed("seed", self.seed)
         for name in ("seeds", "pushes"):
             require_count(name, getattr(self, name), 1)
-        for name in ("pace", "teaching", "walking"):
-            require_number(name, getattr(self, name), 0.0, open_low=True)
+        require_number("pace", self.pace, 0.0, open_low=True)
+        for name in ("teaching", "walking", "survive"):
+            require_duration(name, getattr(self, name))
         require_number("judged", self.judged, 1.0)
         require_number("survive", self.survive, 1.0 + PUSH_DURATION)
         if self.walking <= self.judged:

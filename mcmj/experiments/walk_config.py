@@ -8,7 +8,15 @@ from mcmj.errors import InvalidArgumentError, UnknownNameError
 from mcmj.gaits import GAITS, LEGS
 from mcmj.library import open_body
 from mcmj.quadruped import Quadruped
-from mcmj.validation import Array, require_count, require_names, require_number, require_timestep
+from mcmj.validation import (
+    Array,
+    require_count,
+    require_duration,
+    require_names,
+    require_number,
+    require_seed,
+    require_timestep,
+)
 from mcmj.walker import PUSH_DURATION
 
 PARTS = ("walk", "switch", "push", "adapt", "recover", "steps", "cost")
@@ -72,18 +80,20 @@ class Config:
     def __post_init__(self) -> None:
         require_names("gait", self.gaits, GAITS)
         require_names("part", self.parts, PARTS)
-        require_count("seed", self.seed, 0)
+        require_seed("seed", self.seed)
         require_count("seeds", self.seeds, 1)
         require_count("moments", self.moments, 1)
         require_count("starts", self.starts, 1)
-        for name in ("pace", "walking", "before", "after", "survive"):
-            require_number(name, getattr(self, name), 0.0, open_low=True)
         require_timestep("timestep", self.timestep)
+        require_number("pace", self.pace, 0.0, open_low=True)
+        for name in ("walking", "before", "after", "survive", "settle"):
+            require_duration(
+                name, getattr(self, name), self.timestep / self.pace, open_low=name != "settle"
+            )
         require_number("survive", self.survive, 2 * PUSH_DURATION)
         if {"adapt", "recover"} & set(self.parts):
             require_number("after", self.after, SHORTEST / self.pace)
-        for name in ("settle", "nudge"):
-            require_number(name, getattr(self, name), 0.0)
+        require_number("nudge", self.nudge, 0.0)
         require_number("coupling", self.coupling, -10.0, 10.0)
         if self.coupling == 0.0:
             raise InvalidArgumentError("coupling", "a number other than 0", self.coupling)
