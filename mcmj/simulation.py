@@ -7,8 +7,10 @@ Two conventions hold under every integrator:
   stages of RK4.
 """
 
+import hashlib
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import replace
+from dataclasses import fields, replace
+from functools import cached_property
 
 import mujoco
 import numpy as np
@@ -146,16 +148,26 @@ class Simulation:
         self._engine.set_state(positions, velocities)
 
     def snapshot(self) -> Array:
-        """The full integration state; `restore` continues from it bit for bit."""
-        return self._engine.snapshot()
+        """The full integration state; `restore` continues from it bit for bit.
+
+        Its last column is a number that only the same body and settings have.
+        """
+        state = self._engine.snapshot()
+        return np.column_stack([state, np.full(len(state), self._fingerprint)])
 
     def restore(self, snapshot: Array) -> None:
         """Continue from a `snapshot` of a simulation of the same body and settings.
 
         Raises:
-            InvalidArgumentError: a snapshot of another size.
+            InvalidArgumentError: a snapshot of another body, time step or other setting.
         """
-        self._engine.restore(snapshot)
+        values = np.asarray(snapshot)
+        if values.ndim != 2 or (values[:, -1:] != self._fingerprint).any():
+            raise InvalidArgumentError(
+                "snapshot", f"one of {self.body!r} and these settings: {self._engine.options}",
+                f"another, of shape {values.shape}",
+            )  # fmt: skip
+        self._engine.restore(values[:, :-1])
 
     def rollout(
         self,
@@ -218,6 +230,17 @@ class Simulation:
         return self._chunks(drive, frozenset(record), hook, 1 if hook else chunk)
 
     # --- inside ------------------------------------------------------------------------------
+
+    @cached_property
+    def _fingerprint(self) -> float:
+        """48 bits of a hash of the body's arrays and the settings, exact as a float."""
+        options = self._engine.options
+        name = getattr(options.springs, "name", options.springs)
+        digest = hashlib.blake2b(repr(replace(options, springs=name)).encode(), digest_size=6)
+        for field in fields(self.body):
+            array = getattr(self.body, field.name)
+            digest.update(repr(array.shape).encode() + array.tobytes())
+        return float(int.from_bytes(digest.digest()))
 
     def _checked_readout(self, w_out: object) -> Array:
         return checked_readout(self.body, w_out)

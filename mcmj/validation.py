@@ -98,8 +98,8 @@ def require_count(name: str, value: int, low: int, high: int = MOST_COUNT) -> No
     """Raise unless value is an integer in [low, high]."""
     whole = isinstance(value, int | np.integer) and not isinstance(value, bool)
     if not whole or not low <= value <= high:
-        at_most = f" and at most {high}" if whole and value > high else ""
-        wanted = f"an integer >= {low}{at_most}"
+        tight = high < MOST_COUNT or (whole and value > high)
+        wanted = f"an integer in [{low}, {high}]" if tight else f"an integer >= {low}"
         raise InvalidArgumentError(name, wanted, repr(value))
 
 

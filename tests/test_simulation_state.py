@@ -1,11 +1,14 @@
 """What carries over between calls: state, snapshots, resets, chunks."""
 
+from dataclasses import fields
+
 import numpy as np
 import pytest
 import twins
 from rollouts import ALL, VARIANTS, T, assert_same, exact_oscillator, join, part, same_bits
 
-from mcmj import Simulation
+from mcmj import Body, Simulation
+from mcmj.errors import InvalidArgumentError
 from mcmj.simulation import CHUNK
 
 
@@ -31,6 +34,27 @@ def test_snapshot_and_restore(body, w_bias, drive, options):
     twin = Simulation(body, w_out=w_bias, **options)
     twin.restore(snapshot)
     assert same_bits(first, twin.rollout(**part(drive, 57, T), record=ALL), (*ALL, "times"))
+
+
+@pytest.mark.parametrize("engine", ["mujoco", "twin"])
+def test_a_snapshot_of_something_else_is_refused(body, engine):
+    simulation = Simulation(body, engine=engine)
+    heavier = {f.name: getattr(body, f.name) for f in fields(body)} | {"masses": 2 * body.masses}
+    others = [
+        Simulation(Body(**heavier), engine=engine),
+        Simulation(body, engine=engine, timestep=2e-3),
+        Simulation(body, engine=engine, integrator="RK4"),
+    ]
+    for other in others:
+        assert other.snapshot().shape == simulation.snapshot().shape
+        with pytest.raises(InvalidArgumentError, match=r"^snapshot: .*timestep=0\.001"):
+            simulation.restore(other.snapshot())
+    for wrong in (None, "x", 3.0, [], [[]]):
+        with pytest.raises(InvalidArgumentError, match=r"^snapshot: "):
+            simulation.restore(wrong)
+    simulation.restore(
+        Simulation(Body(**heavier | {"masses": body.masses}), engine=engine).snapshot()
+    )
 
 
 @pytest.mark.parametrize("options", VARIANTS)

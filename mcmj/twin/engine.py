@@ -25,7 +25,8 @@ class TwinEngine:
         timestep, integrator = options.timestep, options.integrator
         if integrator not in TWIN_OF:
             raise UnknownNameError("integrator of the twin", integrator, TWIN_OF)
-        self.body, self.timestep, self.integrator = body, timestep, integrator
+        self.body, self.options = body, options
+        self.timestep, self.integrator = timestep, integrator
         self.copies = copies
         self._population = Population(
             [body] * copies,
