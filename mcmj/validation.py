@@ -94,12 +94,13 @@ def require_seed(name: str, value: int) -> None:
     require_count(name, value, 0, LARGEST_SEED)
 
 
-def require_count(name: str, value: int, low: int, high: int = MOST_COUNT) -> None:
-    """Raise unless value is an integer in [low, high]."""
+def require_count(name: str, value: int, low: int, high: int | None = None) -> None:
+    """Raise unless value is an integer in [low, high]; high is MOST_COUNT if not given."""
     whole = isinstance(value, int | np.integer) and not isinstance(value, bool)
-    if not whole or not low <= value <= high:
-        tight = high < MOST_COUNT or (whole and value > high)
-        wanted = f"an integer in [{low}, {high}]" if tight else f"an integer >= {low}"
+    most = MOST_COUNT if high is None else high
+    if not whole or not low <= value <= most:
+        open_end = high in (None, LARGEST_SEED) and not (whole and value > most)
+        wanted = f"an integer >= {low}" if open_end else f"an integer in [{low}, {most}]"
         raise InvalidArgumentError(name, wanted, repr(value))
 
 

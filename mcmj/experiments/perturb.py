@@ -48,7 +48,8 @@ class Config:
     Attributes:
         task: van_der_pol, quadratic or lissajous.
         body: a body file, or the name of a body that comes with mcmj; default: a random body.
-            It is always taught: readouts in the file are not used.
+            It is always taught: readouts in the file are not used. Integrator and spring law
+            are the file's, unless the engine is the twin.
         seed: of the random body, the noises and the forces.
         seeds: number of bodies of consecutive seeds for the table of successes.
         before, window, after: lengths of the phases: undisturbed, disturbed, free again [s].

@@ -31,7 +31,8 @@ class Config:
     """What to show.
 
     Attributes:
-        body: a body file, or the name of a body that comes with mcmj.
+        body: a body file, or the name of a body that comes with mcmj; it is stepped as the
+            file says.
         trajectory: a trajectory file (.npz or .zarr) with a body and positions, shown instead
             of a run.
         readout: name of a readout in the body file; default: that of the task, else its active
