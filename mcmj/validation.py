@@ -99,7 +99,7 @@ def require_count(name: str, value: int, low: int, high: int | None = None) -> N
     whole = isinstance(value, int | np.integer) and not isinstance(value, bool)
     most = MOST_COUNT if high is None else high
     if not whole or not low <= value <= most:
-        open_end = high in (None, LARGEST_SEED) and not (whole and value > most)
+        open_end = high in (None, LARGEST_SEED, MOST_STEPS) and not (whole and value > most)
         wanted = f"an integer >= {low}" if open_end else f"an integer in [{low}, {most}]"
         raise InvalidArgumentError(name, wanted, repr(value))
 
