@@ -22,20 +22,20 @@ def _choose_gl() -> None:
 _choose_gl()
 
 from mcmj import reference  # noqa: E402
-from mcmj.body import Body  # noqa: E402  (mujoco reads MUJOCO_GL at import)
-from mcmj.bodyfile import from_mjcf  # noqa: E402
-from mcmj.ensemble import Ensemble  # noqa: E402
-from mcmj.errors import McmjError  # noqa: E402
-from mcmj.generator import random_body  # noqa: E402
-from mcmj.lessons import Teaching  # noqa: E402
-from mcmj.mjcf import to_mjcf  # noqa: E402
-from mcmj.phases import Phase, RandomForces, Schedule  # noqa: E402
-from mcmj.readout import fit_readout  # noqa: E402
-from mcmj.schedule import run_schedule  # noqa: E402
-from mcmj.simulation import Simulation  # noqa: E402
-from mcmj.spring_laws import SpringLaw  # noqa: E402
-from mcmj.targets import Target, target  # noqa: E402
-from mcmj.teaching import teach  # noqa: E402
+from mcmj.core.body import Body  # noqa: E402  (mujoco reads MUJOCO_GL at import)
+from mcmj.core.callbacks.spring_laws import SpringLaw  # noqa: E402
+from mcmj.core.random_body import random_body  # noqa: E402
+from mcmj.learning.lessons import Teaching  # noqa: E402
+from mcmj.learning.regression import fit_readout  # noqa: E402
+from mcmj.learning.teaching import teach  # noqa: E402
+from mcmj.mjcf.read import from_mjcf  # noqa: E402
+from mcmj.mjcf.write import to_mjcf  # noqa: E402
+from mcmj.simulation.ensemble import Ensemble  # noqa: E402
+from mcmj.simulation.phases import Phase, RandomForces, Schedule  # noqa: E402
+from mcmj.simulation.run_phases import run_schedule  # noqa: E402
+from mcmj.simulation.simulation import Simulation  # noqa: E402
+from mcmj.targets.limit_cycles import Target, target  # noqa: E402
+from mcmj.utils.errors import McmjError  # noqa: E402
 
 __all__ = [
     "Body",

@@ -1,61 +1,6 @@
-"""Guided search for settings of any experiment (Optuna), judged on bodies it has not seen.
+"""Guided search for settings of any experiment (Optuna), judged on bodies it has not seen. The same as `mcmj guided`."""
 
-Killed at any moment, the same command goes on.
-"""
-
-from pathlib import Path
-from typing import Any
-
-from rich.console import Console
-from rich.table import Table
-
-from mcmj import store
-from mcmj.cli import Output, main
-from mcmj.experiments.guided import Config, Result, run
-from mcmj.plotting import save
-from mcmj.progress import trial_bar
-from mcmj.rates import rate_cells
-from mcmj.searchplot import guided_figure
-
-
-def work(config: Config, output: Output, out: Path) -> None:
-    with trial_bar(
-        "settings", config.settings, maximise=config.large_is_good, quiet=output.quiet
-    ) as on_setting:
-        result = run(config, folder=out, on_setting=on_setting)
-    figure = guided_figure(
-        [objective for _, objective in result.tried],
-        result.judged,
-        config.threshold,
-        names=(config.objective, config.target.name),
-        maximise=(config.large_is_good, config.maximise),
-    )
-    save(figure, out / "guided.png")
-    store.write_metrics(out / "metrics.json", "guided", config, config.first_seed, result.metrics)
-    if not output.quiet:
-        show(result, out)
-
-
-def show(result: Result, out: Path) -> None:
-    console = Console()
-    metrics: dict[str, Any] = result.metrics
-    table = Table(title=f"{result.config.judged} bodies that the search has not seen")
-    for column in ("settings", "successes", "95 % interval", "median score", "objective"):
-        table.add_column(column)
-    for name in result.judged:
-        row = metrics[name.replace("-", "_") + "_on_other_bodies"]
-        median, objective = f"{row['median_score']:.3g}", f"{row['objective']:.3f}"
-        table.add_row(name, *rate_cells(row), median, objective)
-    console.print(table)
-    console.print(f"guided: {result.best}")
-    console.print(f"hand-chosen: {metrics['hand_chosen']}")
-    if result.confirmed.size:
-        console.print(
-            f"guided, in MuJoCo: {metrics['confirmed']} bodies, the same verdict in "
-            f"{100 * metrics['twin_mujoco_agreement']:.1f} %"
-        )
-    console.print(f"results in {out}")
-
+from mcmj.__main__ import main
 
 if __name__ == "__main__":
-    main("guided", Config, work)
+    main("guided")

@@ -4,8 +4,8 @@ from hypothesis import settings
 from rollouts import T
 
 import mcmj
-from mcmj.stability.cycle import find_cycle
-from mcmj.stability.loop import ClosedLoop
+from mcmj.analysis.stability.cycle import find_cycle
+from mcmj.analysis.stability.loop import ClosedLoop
 
 # compiling models takes milliseconds to seconds; every run tries the same examples
 settings.register_profile("mcmj", deadline=None, max_examples=40, derandomize=True)

@@ -11,7 +11,7 @@ import pytest
 ROOT = Path(__file__).parent.parent
 PROGRAM = """
 import mcmj
-from mcmj.library import body_names, body_path
+from mcmj.mjcf.bundled import body_names, body_path
 body, w_out = mcmj.from_mjcf(body_path("van_der_pol"))
 run = mcmj.Simulation(body, w_out=w_out).rollout(100)
 print(mcmj.__file__, *body_names(), run.outputs.shape)

@@ -1,1 +1,1 @@
-"""One experiment a module: a frozen Config, and run(config) -> Result."""
+"""One folder an experiment: config, run, figure, command. `mcmj NAME` runs it."""

@@ -16,9 +16,9 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
-from mcmj.errors import InvalidArgumentError, OutputError, StoreError
 from mcmj.search.experiment import DIVERGED, DONE, Outcome, Trial
-from mcmj.store import plain
+from mcmj.utils.errors import InvalidArgumentError, OutputError, StoreError
+from mcmj.utils.files import plain
 
 APPLICATION = 0x6D636D6A  # "mcmj", in the file's header
 SCHEMA = 2  # 2: keys know the experiment's code, the body file and MuJoCo's version

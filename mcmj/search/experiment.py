@@ -28,20 +28,20 @@ from typing import Any
 
 from threadpoolctl import threadpool_limits
 
-from mcmj.errors import (
+from mcmj.core.options import DEFAULT_INTEGRATOR
+from mcmj.core.random_body import draw_body
+from mcmj.mjcf.bundled import body_path
+from mcmj.mjcf.write import to_mjcf
+from mcmj.search.overrides import override
+from mcmj.utils.errors import (
     DivergenceError,
     InvalidArgumentError,
     McmjError,
     McmjWarning,
     UnknownNameError,
 )
-from mcmj.generator import draw_body
-from mcmj.library import body_path
-from mcmj.metricpath import matched, numbers_at, quantity
-from mcmj.mjcf import to_mjcf
-from mcmj.options import DEFAULT_INTEGRATOR
-from mcmj.search.overrides import override
-from mcmj.store import plain, versions
+from mcmj.utils.files import plain, versions
+from mcmj.utils.metric_paths import matched, numbers_at, quantity
 
 PACKAGE = "mcmj.experiments"
 ORBIT_ERRORS = "*/orbit_error"

@@ -6,9 +6,9 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from mcmj.errors import McmjError
 from mcmj.search.database import TrialStore
-from mcmj.store import whole_file
+from mcmj.utils.errors import McmjError
+from mcmj.utils.files import whole_file
 
 
 def table(store: TrialStore) -> dict[str, list[Any]]:

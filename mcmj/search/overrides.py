@@ -8,7 +8,7 @@ import typing
 from collections.abc import Mapping
 from typing import Any, TypeVar
 
-from mcmj.errors import InvalidArgumentError, UnknownNameError
+from mcmj.utils.errors import InvalidArgumentError, UnknownNameError
 
 C = TypeVar("C")
 

@@ -9,9 +9,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mcmj.errors import InvalidArgumentError
-from mcmj.streams import stream
-from mcmj.validation import require_count, require_number
+from mcmj.utils.errors import InvalidArgumentError
+from mcmj.utils.seeds import stream
+from mcmj.utils.validation import require_count, require_number
 
 MAX_TRIALS = 1_000_000  # of one search: each is built before the first runs
 MAX_SEED = 2**63 - 1  # what a store can hold

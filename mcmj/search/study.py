@@ -10,8 +10,8 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
-from mcmj.errors import InvalidArgumentError, McmjError, OutputError
 from mcmj.search.space import Choices, Range, Space
+from mcmj.utils.errors import InvalidArgumentError, McmjError, OutputError
 
 Evaluate = Callable[[dict[str, object]], float]  # a setting -> its objective
 

@@ -5,8 +5,8 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 import numpy.typing as npt
 
-from mcmj.rates import success_rate
 from mcmj.search.space import Range, Space
+from mcmj.utils.success_rates import success_rate
 
 BINS = 6  # of a random range
 

@@ -12,8 +12,8 @@ from contextlib import contextmanager
 from multiprocessing.connection import wait
 from typing import Any, Protocol, TypeVar
 
-from mcmj.errors import InvalidArgumentError, McmjError
-from mcmj.validation import require_count
+from mcmj.utils.errors import InvalidArgumentError, McmjError
+from mcmj.utils.validation import require_count
 
 T = TypeVar("T")
 _ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")

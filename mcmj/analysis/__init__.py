@@ -1,0 +1,1 @@
+"""What springs can compute, by theory (Lie brackets, arrays, emulation); `stability/` of what was learned."""

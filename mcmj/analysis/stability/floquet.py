@@ -1,0 +1,152 @@
+"""Floquet multipliers of a body's cycle and of the system it was taught.
+
+The multipliers are the eigenvalues of the monodromy matrix D phi_T at a point of the cycle,
+phi_T the flow map over one period. One is 1, of a shift along the cycle; the cycle is stable
+if all others are smaller in magnitude (Guckenheimer and Holmes 1983, section 1.5).
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+from scipy.integrate import solve_ivp
+
+from mcmj.analysis.stability.cycle import Cycle, flow_map
+from mcmj.analysis.stability.loop import ClosedLoop
+from mcmj.analysis.stability.variational import variational
+from mcmj.targets.limit_cycles import ATOL, RTOL, Target
+from mcmj.utils.errors import InvalidArgumentError
+from mcmj.utils.validation import Array, require_number
+
+Complex = npt.NDArray[np.complex128]
+
+# Of a cycle's size. Central differences are off by about eps^2 (truncation) and by
+# 1e-12 / eps (rounding: 1e-14 m in positions of 100 m, cycles of 0.05 m): least near 1e-4;
+# tests/test_stability.py shows the plateau.
+DIFFERENCE = 1e-4
+
+
+@dataclass(frozen=True)
+class Floquet:
+    """Multipliers by two methods.
+
+    Attributes:
+        multipliers: (n,) by differences, largest first, the phase's (nearest to 1) ahead.
+        variational: (n,) by the linearised step map, in the same order.
+        disagreement: largest difference between the two sets, matched, for all n.
+        phase_error: |D phi_T t - t| / |t|, t the tangent: how exactly the phase is neutral.
+        monodromy: (n, n) by differences.
+        leading_vector: (n,) eigenvector of the leading nontrivial multiplier.
+    """
+
+    multipliers: Complex
+    variational: Complex
+    disagreement: float
+    phase_error: float
+    monodromy: Array
+    leading_vector: Complex
+
+    @property
+    def phase(self) -> float:
+        """|multiplier| of a shift along the cycle: 1."""
+        return float(abs(self.multipliers[0]))
+
+    @property
+    def leading_nontrivial(self) -> float:
+        """Largest magnitude but for the phase's; below 1 the cycle is stable."""
+        return float(abs(self.multipliers[1]))
+
+
+def differences(loop: ClosedLoop, cycle: Cycle, eps: float = DIFFERENCE) -> Array:
+    """Monodromy matrix (n, n) by central differences, 2 n copies at once in the twin.
+
+    Args:
+        eps: perturbation of each coordinate, in units of cycle.scale.
+
+    Raises:
+        DivergenceError: a copy blew up.
+        InvalidArgumentError: eps out of bounds.
+    """
+    require_number("eps", eps, 0.0, 0.1, open_low=True)
+    nudges = np.diag(eps * cycle.scale)
+    starts = np.concatenate([cycle.state + nudges, cycle.state - nudges])
+    ends = flow_map(loop, starts, cycle.period)
+    forward, backward = ends[: loop.size], ends[loop.size :]
+    return ((forward - backward) / (2 * np.diag(nudges)[:, None])).T
+
+
+def multipliers(monodromy: Array) -> tuple[Complex, Complex]:
+    """Multipliers (n,), the one nearest to 1 ahead and then by size, and eigenvectors (n, n)."""
+    values, vectors = np.linalg.eig(monodromy)
+    values, vectors = values.astype(np.complex128), vectors.astype(np.complex128)
+    phase = int(np.abs(values - 1.0).argmin())
+    rank = np.abs(values)
+    rank[phase] = np.inf
+    order = np.argsort(-rank, kind="stable")
+    return values[order], vectors[:, order]
+
+
+def floquet(loop: ClosedLoop, cycle: Cycle, eps: float = DIFFERENCE) -> Floquet:
+    """Multipliers of a cycle by differences in the twin and by the linearised step map.
+
+    Raises:
+        DivergenceError: a copy blew up.
+    """
+    monodromy = differences(loop, cycle, eps)
+    values, vectors = multipliers(monodromy)
+    _, exact = variational(loop, cycle.state, cycle.period)
+    other = _matched(multipliers(exact)[0], values)
+    moved = monodromy @ cycle.tangent
+    change = np.linalg.norm((moved - cycle.tangent) / cycle.scale)
+    return Floquet(
+        multipliers=values,
+        variational=other,
+        disagreement=float(np.abs(values - other).max()),
+        phase_error=float(change / np.linalg.norm(cycle.tangent / cycle.scale)),
+        monodromy=monodromy,
+        leading_vector=vectors[:, 1],
+    )
+
+
+def target_multipliers(target: Target) -> Complex:
+    """Multipliers (n,) of the system a target is a cycle of, the phase's ahead.
+
+    By DOP853 on x' = f(x), X' = f'(x) X over one period.
+
+    Raises:
+        InvalidArgumentError: a target without a system (Lissajous figures, arrays).
+    """
+    if target.rhs is None:
+        raise InvalidArgumentError("target", "the cycle of a system x' = f(x)", target.name)
+    n, rhs = target.n_outputs, target.rhs
+
+    def extended(t: float, z: Array) -> Array:
+        x, X = z[:n], z[n:].reshape(n, n)
+        return np.concatenate([rhs(t, x), (jacobian(rhs, x) @ X).ravel()])
+
+    start = np.concatenate([target.sample(np.zeros(1))[0], np.eye(n).ravel()])
+    solution = solve_ivp(
+        extended, (0.0, target.period), start, method="DOP853", rtol=RTOL, atol=ATOL
+    )
+    return multipliers(solution.y[n:, -1].reshape(n, n))[0]
+
+
+def jacobian(rhs: Callable[[float, Array], Array], x: Array, step: float = 1e-4) -> Array:
+    """f'(x) (n, n) by central differences of fourth order: exact for cubic polynomials."""
+
+    def slope(width: float) -> Array:
+        rows = [(rhs(0.0, x + e) - rhs(0.0, x - e)) / (2 * width) for e in width * np.eye(len(x))]
+        return np.array(rows).T
+
+    return (4 * slope(step) - slope(2 * step)) / 3
+
+
+def _matched(values: Complex, to: Complex) -> Complex:
+    """`values` in the order in which they lie nearest to `to`, each used once."""
+    left, order = list(range(len(values))), []
+    for wanted in to:
+        best = min(left, key=lambda i: abs(values[i] - wanted))
+        left.remove(best)
+        order.append(best)
+    return values[order]

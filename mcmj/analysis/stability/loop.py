@@ -1,0 +1,161 @@
+"""A body in closed loop as a map of its state vector, for many copies at once.
+
+    z_{k+1} = Phi(z_k, u_k),   z = (positions of the free nodes, their velocities), n = 4 x free
+
+Phi is one step of the compiled twin of MuJoCo's Euler; z leaves nothing out, because the
+readout is static and the outputs are fed back in the step in which they are read.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from mcmj.core.body import Body, spring_lengths
+from mcmj.core.rollout_arguments import check_drive
+from mcmj.core.trajectory import State
+from mcmj.mjcf.write import checked_readout
+from mcmj.reference.twin.population import Population
+from mcmj.utils.errors import DivergenceError
+from mcmj.utils.validation import Array, as_array, require_count, require_number
+
+METHOD = "semi_implicit_euler"
+
+
+@dataclass(frozen=True)
+class Run:
+    """What became of B copies.
+
+    Attributes:
+        states: (B, n) after the last step.
+        outputs: (B, T, n_outputs) before each step; undefined after a copy blew up.
+        alive: (B,) whether a copy was finite to the end.
+    """
+
+    states: Array
+    outputs: Array
+    alive: npt.NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class ClosedLoop:
+    """A trained body under its own readout.
+
+    Attributes:
+        body: the body.
+        w_out: readout (L, n_outputs), or with a bias in the last row; None: open loop.
+        timestep: control and physics step [s].
+        threads: results do not depend on them.
+
+    Raises:
+        InvalidArgumentError: an argument out of bounds.
+    """
+
+    body: Body
+    w_out: Array | None
+    timestep: float = 1e-3
+    threads: int = 1
+
+    def __post_init__(self) -> None:
+        require_number("timestep", self.timestep, 0.0, open_low=True)
+        require_count("threads", self.threads, 1)
+        if self.w_out is not None:
+            object.__setattr__(self, "w_out", checked_readout(self.body, self.w_out))
+
+    @property
+    def size(self) -> int:
+        """n, the dimension of the state."""
+        return 4 * len(self.body.free)
+
+    def vector(self, state: State) -> Array:
+        """(n,): positions [m], then velocities [m/s], of the free nodes."""
+        free = self.body.free
+        return np.concatenate([state.positions[free], state.velocities[free]], axis=None)
+
+    def nodes(self, states: Array) -> tuple[Array, Array]:
+        """Positions and velocities (..., N, 2) [m], [m/s] of states (..., n)."""
+        lead = states.shape[:-1]
+        moving = states.reshape(*lead, 2, -1, 2)
+        positions = np.broadcast_to(self.body.positions, (*lead, self.body.n_nodes, 2)).copy()
+        velocities = np.zeros_like(positions)
+        positions[..., self.body.free, :] = moving[..., 0, :, :]
+        velocities[..., self.body.free, :] = moving[..., 1, :, :]
+        return positions, velocities
+
+    def outputs(self, states: Array) -> Array:
+        """y = W_out^T l + b, (..., n_outputs), of states (..., n)."""
+        lengths = spring_lengths(self.nodes(states)[0], self.body.springs)
+        if self.w_out is None:
+            return np.zeros((*states.shape[:-1], self.body.n_outputs))
+        n = self.body.n_springs
+        return lengths @ self.w_out[:n] + self.w_out[n:].sum(axis=0)
+
+    def run(
+        self,
+        states: Array,
+        steps: int | None = None,
+        *,
+        offset: object = None,
+        forces: object = None,
+        gate: object = None,
+    ) -> Run:
+        """Advance copies (B, n) by T steps; offset, forces and gate as for Ensemble.rollout.
+
+        Copies that blow up are reported in `alive`, not raised.
+
+        Raises:
+            InvalidArgumentError: an argument out of bounds.
+        """
+        start = as_array("states", states, (None, self.size))
+        copies = len(start)
+        drive = check_drive(
+            self.body, steps=steps, inputs=None, offset=offset, gate=gate, forces=forces,
+            closed=self.w_out is not None, copies=copies,
+        )  # fmt: skip
+        population = self._population(start)
+        record, done = population.run(drive, 0, drive.steps, lengths=False)
+        return Run(self._vectors(population), record.outputs, done == drive.steps)
+
+    def trail(self, state: Array, stride: int, samples: int) -> Array:
+        """States (samples, n) every `stride` steps of the undisturbed run from a state (n,)."""
+        population = self._population(np.asarray(state)[None])
+        drive = check_drive(
+            self.body, steps=max(1, stride), inputs=None, offset=None, gate=None, forces=None,
+            closed=self.w_out is not None,
+        )  # fmt: skip
+        states = [np.asarray(state)[None]]
+        for _ in range(samples - 1):
+            population.run(drive, 0, drive.steps, lengths=False)
+            states.append(self._vectors(population))
+        return np.concatenate(states)
+
+    def advance(self, states: Array, steps: int) -> Array:
+        """States (B, n) after some undisturbed steps (0 or more).
+
+        Raises:
+            DivergenceError: a copy blew up.
+        """
+        if steps == 0:
+            return states
+        run = self.run(states, steps)
+        if not run.alive.all():
+            raise DivergenceError(
+                f"copy {int(np.argmin(run.alive))} of the closed loop blew up within "
+                f"{steps * self.timestep:g} s; try a smaller step, or another readout",
+                time=0.0,
+                steps_done=0,
+            )
+        return run.states
+
+    def _population(self, states: Array) -> Population:
+        copies = len(states)
+        pairs = zip(*self.nodes(states), strict=True)
+        return Population(
+            [self.body] * copies, [self.w_out] * copies, method=METHOD, timestep=self.timestep,
+            states=[State(p, v) for p, v in pairs], threads=self.threads, packed=copies > 1,
+        )  # fmt: skip
+
+    def _vectors(self, population: Population) -> Array:
+        now, free = population.kernel_state, self.body.free
+        moving = np.stack([now.positions[:, free], now.velocities[:, free]], axis=1)
+        return moving.reshape(len(moving), -1)

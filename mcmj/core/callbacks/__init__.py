@@ -1,0 +1,4 @@
+"""Compiled code that MuJoCo calls within a step: springs, spring laws, the readout, the leapfrog.
+
+`install` puts it in; all that a callback trusts is a key of a table of this process (`law_table`).
+"""

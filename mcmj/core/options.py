@@ -1,0 +1,51 @@
+"""How a simulation is stepped, checked once for every engine."""
+
+from dataclasses import dataclass
+
+from mcmj.core.callbacks.spring_laws import NATIVE, SpringLaw
+from mcmj.utils.errors import InvalidArgumentError, UnknownNameError
+from mcmj.utils.validation import require_count, require_timestep
+
+ENGINES = ("mujoco", "twin")
+DEFAULT_INTEGRATOR = "Euler"
+
+
+@dataclass(frozen=True)
+class Options:
+    """Arguments of a Simulation that are not the body's; see there.
+
+    Raises:
+        InvalidArgumentError, UnknownNameError: out of bounds, or not done by the engine.
+    """
+
+    timestep: float = 1e-3
+    integrator: str = DEFAULT_INTEGRATOR
+    springs: str | SpringLaw = NATIVE
+    feedback_delay: int = 0
+    substeps: int = 1
+    engine: str = "mujoco"
+
+    def __post_init__(self) -> None:
+        require_timestep("timestep", self.timestep)
+        require_count("feedback_delay", self.feedback_delay, 0)
+        require_count("substeps", self.substeps, 1)
+        if self.engine not in ENGINES:
+            raise UnknownNameError("engine", self.engine, ENGINES)
+        if self.engine == "twin":
+            self._check_twin()
+        elif self.feedback_delay and self.integrator == "RK4":
+            raise InvalidArgumentError(
+                "feedback_delay", "0 under RK4, whose inner stages MuJoCo's delayed sensors keep",
+                self.feedback_delay,
+            )  # fmt: skip
+
+    @property
+    def physics_step(self) -> float:
+        """Of the integrator [s]."""
+        return self.timestep / self.substeps
+
+    def _check_twin(self) -> None:
+        for name, only in (("springs", NATIVE), ("feedback_delay", 0), ("substeps", 1)):
+            value = getattr(self, name)
+            if value != only:
+                raise InvalidArgumentError(name, f"{only!r} with the twin", repr(value))

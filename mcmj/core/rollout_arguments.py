@@ -1,0 +1,96 @@
+"""What drives a body during a rollout, checked once, for every engine.
+
+One law covers every experiment of the paper; channel c at control step k pushes with
+
+    g_c (w_out[:, c] . lengths_k) + offset[k, c]
+
+Teacher forcing is g = 0 with offset = teacher + noise, the closed loop g = 1 without offset.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from mcmj.core.body import Body
+from mcmj.utils.errors import InvalidArgumentError
+from mcmj.utils.validation import MOST_STEPS, Array, as_array, require_count
+
+
+@dataclass(frozen=True)
+class Drive:
+    """Checked arguments of a rollout; None means zero. `...` is nothing, or (copies,).
+
+    Attributes:
+        steps: number of control steps T.
+        inputs: (..., T, n_inputs).
+        offset: (..., T, n_outputs), added to the fed-back outputs.
+        gate: (n_outputs,): 1 closes a feedback channel, 0 opens it.
+        forces: (..., T, N) horizontal forces on the nodes [N]; T = 1 if constant.
+    """
+
+    steps: int
+    inputs: Array | None
+    offset: Array | None
+    gate: Array
+    forces: Array | None
+
+
+def check_drive(
+    body: Body,
+    *,
+    steps: int | None,
+    inputs: object,
+    offset: object,
+    gate: object,
+    forces: object,
+    closed: bool,
+    copies: int | None = None,
+) -> Drive:
+    """Check the arguments of a rollout; T is `steps`, or the length of what varies in time.
+
+    Args:
+        closed: what the gate is if it is not given.
+        copies: size of the ensemble, whose arrays may have a leading axis of that length.
+
+    Raises:
+        InvalidArgumentError: wrong shapes, lengths that disagree, NaN, or no length at all.
+    """
+    constant = forces is not None and np.ndim(forces) == 1  # type: ignore[arg-type]
+    if constant:
+        forces = as_array("forces", forces, (body.n_nodes,))[None]
+    arrays = {
+        "inputs": _series("inputs", inputs, body.n_inputs, copies),
+        "offset": _series("offset", offset, body.n_outputs, copies),
+        "forces": _series("forces", forces, body.n_nodes, copies),
+    }
+    total = _common_length(steps, arrays, constant=constant)
+    if gate is None:
+        gate = np.full(body.n_outputs, float(closed))
+    elif np.ndim(gate) == 0:  # type: ignore[arg-type]
+        gate = np.full(body.n_outputs, gate)
+    return Drive(steps=total, gate=as_array("gate", gate, (body.n_outputs,)), **arrays)
+
+
+def _series(name: str, value: object, width: int, copies: int | None) -> Array | None:
+    if value is None:
+        return None
+    if copies is not None and np.ndim(value) == 3:  # type: ignore[arg-type]
+        return as_array(name, value, (copies, None, width))
+    return as_array(name, value, (None, width))
+
+
+def _common_length(steps: int | None, arrays: dict[str, Array | None], *, constant: bool) -> int:
+    lengths = {name: array.shape[-2] for name, array in arrays.items() if array is not None}
+    if constant or (lengths.get("forces") == 1 and (steps is not None or len(lengths) > 1)):
+        del lengths["forces"]
+    if steps is None:
+        if not lengths:
+            raise InvalidArgumentError(
+                "steps", "a number of steps, or inputs, offset or forces over time", None
+            )
+        steps = next(iter(lengths.values()))
+    require_count("steps", steps, 1, MOST_STEPS)
+    for name, length in lengths.items():
+        if length != steps:
+            raise InvalidArgumentError(name, f"{steps} rows, one a step", length)
+    return int(steps)

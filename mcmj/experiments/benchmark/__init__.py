@@ -1,0 +1,3 @@
+"""Measure every speed claim of mcmj on this machine: ratios, medians, side by side."""
+
+GROUP = "speed and accuracy"

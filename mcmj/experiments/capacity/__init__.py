@@ -1,0 +1,3 @@
+"""Memory and processing capacity, kernel and generalisation rank of a body; maps of them."""
+
+GROUP = "analysis"

@@ -1,0 +1,249 @@
+"""The report card of a trained body: how good its rhythm is, and how hard to destroy."""
+
+import os
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from threadpoolctl import threadpool_limits
+
+from mcmj.analysis.stability.basin import (
+    Survey,
+    kicked,
+    on_cycle,
+    pushed,
+    scaled_starts,
+    survey,
+)
+from mcmj.analysis.stability.confirm import monodromy_error, verdicts
+from mcmj.analysis.stability.cycle import Cycle, find_cycle
+from mcmj.analysis.stability.floquet import Complex, Floquet, floquet, target_multipliers
+from mcmj.analysis.stability.loop import ClosedLoop
+from mcmj.analysis.stability.lyapunov import Exponent, lyapunov_exponent
+from mcmj.analysis.stability.phase import Diffusion, phase_diffusion
+from mcmj.analysis.stability.tolerance import Tolerance, force_tolerance, noise_tolerance
+from mcmj.core.body import Body
+from mcmj.experiments.certify.config import Config
+from mcmj.experiments.limit_cycle import run as limit_cycle
+from mcmj.learning.teaching import synchronise, teach
+from mcmj.metrics import orbits
+from mcmj.reference.twin.population import rest as rest_state
+from mcmj.simulation.simulation import Simulation
+from mcmj.targets.limit_cycles import Target, target
+from mcmj.utils.errors import McmjError
+from mcmj.utils.progress import OnSteps
+from mcmj.utils.seeds import stream
+from mcmj.utils.validation import Array
+
+STAGES = ("run", "floquet", "lyapunov", "phase", "starts", "kicks", "pushes", "force", "noise")
+
+
+@dataclass(frozen=True)
+class Result:
+    """The certificate.
+
+    Attributes:
+        errors: of the MuJoCo run, by name.
+        outputs: (T, n_outputs) of its last window.
+        floquet, target: multipliers of the body, and of the system it was taught (or None).
+        mujoco_monodromy_error: of the phase's and the leading direction, |D d - M d| / |d|.
+        starts, kicks, pushes: surveys of scales x phases, kicks x copies, pushes x copies.
+        start_outputs: (B, n_outputs) of the starts' states.
+        rest_recovers: whether the loop comes to the orbit from total rest.
+        mujoco_agrees: of a sample of pushes: how many MuJoCo judges as the twin does, of how many.
+        force, force_fine, noise: tolerances of the copies: at the body's own step, where Euler
+            may fail before the body does, and with `refine`; of noise on the lengths.
+    """
+
+    config: Config
+    body: Body
+    target: Target
+    cycle: Cycle
+    errors: dict[str, float]
+    outputs: Array
+    floquet: Floquet
+    target_multipliers: Complex | None
+    mujoco_monodromy_error: float
+    exponent: Exponent
+    diffusion: Diffusion
+    starts: Survey
+    start_outputs: Array
+    rest_recovers: bool
+    kicks: Survey
+    pushes: Survey
+    mujoco_agrees: tuple[int, int]
+    force: Tolerance
+    force_fine: Tolerance
+    noise: Tolerance
+
+    @property
+    def metrics(self) -> dict[str, object]:
+        """As written to metrics.json; multipliers as [real, imaginary]."""
+        wanted = self.target_multipliers
+        return {
+            **self.errors,
+            "period": self.cycle.period,
+            "target_period": self.target.period,
+            "cycle_residual": self.cycle.residual,
+            "floquet_multipliers": _pairs(self.floquet.multipliers),
+            "floquet_multipliers_variational": _pairs(self.floquet.variational),
+            "floquet_disagreement": self.floquet.disagreement,
+            "phase_multiplier_error": abs(self.floquet.multipliers[0] - 1.0),
+            "leading_nontrivial": self.floquet.leading_nontrivial,
+            "mujoco_monodromy_error": self.mujoco_monodromy_error,
+            "target_multipliers": None if wanted is None else _pairs(wanted),
+            "target_leading_nontrivial": None if wanted is None else float(abs(wanted[1])),
+            "basin_fraction": self.starts.fraction,
+            "start_recovery_time": self.starts.median_time,
+            "rest_recovers": self.rest_recovers,
+            "kick_recovery": self.kicks.table(self.config.kicks),
+            "push_recovery": self.pushes.table(self.config.pushes),
+            "mujoco_pushes_agreeing": list(self.mujoco_agrees),
+            "lyapunov_exponent": self.exponent.value,
+            "lyapunov_spread": self.exponent.spread,
+            "phase_diffusion": self.diffusion.coefficient,
+            "phase_jitter_per_period": self.diffusion.jitter,
+            "phase_jitter_standard_error": self.diffusion.jitter_error,
+            "phase_diffusion_noise": self.diffusion.noise,
+            **_tolerances("force_tolerance", self.force_fine),
+            **_tolerances("force_tolerance_own_step", self.force),
+            **_tolerances("noise_tolerance", self.noise),
+        }
+
+
+def run(config: Config, *, on_stages: OnSteps = lambda stages: None) -> Result:
+    """Teach if need be, run in MuJoCo, and certify.
+
+    Raises:
+        DivergenceError: the free run blew up.
+        McmjError: the free run is not on the target's orbit: there is nothing to certify.
+    """
+    goal = target(config.task)
+    with threadpool_limits(1, "blas"):
+        loop, start, outputs, errors = _trained(config, goal)
+        if errors["orbit_error"] >= config.threshold:
+            raise McmjError(
+                f"the free run is off the orbit by {100 * errors['orbit_error']:.3g} % "
+                f"(threshold {100 * config.threshold:g} %): nothing to certify"
+            )
+        on_stages(1)
+        return _certified(config, goal, loop, start, outputs, errors, on_stages)
+
+
+def _trained(config: Config, goal: Target) -> tuple[ClosedLoop, Array, Array, dict[str, float]]:
+    """The loop, a state on the cycle, and the last window of a free run in MuJoCo."""
+    body, readouts, _ = limit_cycle.get_body(config.of_body)
+    simulation, w_out = Simulation(body), readouts.get(config.task)
+    if w_out is None:
+        w_out = teach(simulation, goal, config.teaching, config.noise_seed).w_out
+    else:
+        synchronise(simulation, goal, config.teaching.washout)
+        simulation.set_readout(w_out)
+    last = round(config.window / simulation.timestep)
+    simulation.rollout(max(1, round(config.free_run / simulation.timestep) - last), record=())
+    outputs = simulation.rollout(last, record=("outputs",)).get("outputs")
+    errors = {
+        "orbit_error": orbits.orbit_error(outputs, goal),
+        "period_error": orbits.relative_period_error(outputs, simulation.timestep, goal),
+        "amplitude_error": orbits.relative_amplitude_error(outputs, goal),
+    }
+    loop = ClosedLoop(body, w_out, simulation.timestep, threads=os.cpu_count() or 1)
+    return loop, loop.vector(simulation.state), outputs, errors
+
+
+def _certified(
+    config: Config,
+    goal: Target,
+    loop: ClosedLoop,
+    start: Array,
+    outputs: Array,
+    errors: dict[str, float],
+    on_stages: OnSteps,
+) -> Result:
+    seed, copies = config.noise_seed, config.copies
+    how: dict[str, Any] = {"threshold": config.threshold, "recovery": config.recovery, "seed": seed}
+    cycle = _cycle(config, goal, loop, start)
+    analysis = floquet(loop, cycle)
+    confirmed = monodromy_error(loop, cycle, analysis)
+    on_stages(1)
+    exponent = lyapunov_exponent(
+        loop, cycle.state, interval=cycle.period, scale=cycle.scale, seed=seed
+    )
+    on_stages(1)
+    diffusion = phase_diffusion(loop, cycle, config.diffusion_noise, seed=seed)
+    on_stages(1)
+    begun = scaled_starts(
+        loop, goal, np.repeat(config.scales, config.phases),
+        np.tile(np.arange(config.phases) / config.phases, len(config.scales)),
+        duration=config.teaching.washout,
+    )  # fmt: skip
+    starts = _survey(config, loop, goal, begun)
+    rest = loop.vector(rest_state(loop.body))[None]
+    rest_recovers = bool(_survey(config, loop, goal, rest).recovered[0])
+    on_stages(1)
+    generator = stream(seed, "initial_state")
+    hit = kicked(loop, cycle, np.repeat(config.kicks, copies), generator)
+    kicks = _survey(config, loop, goal, pushed(loop, hit, None, 1.0, refine=config.refine))
+    on_stages(1)
+    pushes, agrees = _pushes(config, goal, loop, cycle)
+    on_stages(1)
+    states = on_cycle(loop, cycle, copies)
+    force = force_tolerance(loop, goal, states, **how)
+    fine = force_tolerance(loop, goal, states, refine=config.refine, **how)
+    on_stages(1)
+    noise = noise_tolerance(loop, goal, states, **how)
+    on_stages(1)
+    return Result(
+        config, loop.body, goal, cycle, errors, outputs, analysis,
+        None if goal.rhs is None else target_multipliers(goal), confirmed, exponent, diffusion,
+        starts, loop.outputs(begun), rest_recovers, kicks, pushes, agrees, force, fine, noise,
+    )  # fmt: skip
+
+
+def _cycle(config: Config, goal: Target, loop: ClosedLoop, start: Array) -> Cycle:
+    """The settled cycle, which must still be the taught one."""
+    cycle = find_cycle(loop, start, goal.period)
+    outputs = loop.run(cycle.state[None], round(2 * cycle.period / loop.timestep)).outputs[0]
+    error = orbits.orbit_error(outputs, goal)
+    if error >= config.threshold:
+        raise McmjError(
+            f"the loop leaves the orbit in the long run: the cycle it settles on is off by "
+            f"{100 * error:.3g} % (threshold {100 * config.threshold:g} %)"
+        )
+    return cycle
+
+
+def _tolerances(name: str, tolerance: Tolerance) -> dict[str, object]:
+    """The median over the copies, its interval, the weakest copy, and all of them."""
+    return {
+        name: tolerance.median,
+        f"{name}_interval_95": list(tolerance.interval),
+        f"{name}_least": tolerance.least,
+        f"{name}_by_copy": np.sort(tolerance.values),
+    }
+
+
+def _survey(config: Config, loop: ClosedLoop, goal: Target, states: Array) -> Survey:
+    return survey(loop, goal, states, duration=config.recovery, threshold=config.threshold)
+
+
+def _pushes(
+    config: Config, goal: Target, loop: ClosedLoop, cycle: Cycle
+) -> tuple[Survey, tuple[int, int]]:
+    """The survey of pushes, and how many of one copy a strength MuJoCo judges alike."""
+    copies, nodes = config.copies, loop.body.n_nodes
+    strengths = np.repeat(config.pushes, copies)
+    pattern = stream(config.noise_seed, "forces").uniform(-1, 1, (len(strengths), nodes))
+    forces, states = strengths[:, None] * pattern, on_cycle(loop, cycle, len(strengths))
+    order = np.arange(len(strengths)).reshape(-1, copies).T.argsort(axis=None)
+    states = states[order]  # every strength at phases all over the cycle
+    result = _survey(config, loop, goal, pushed(loop, states, forces, 1.0, refine=config.refine))
+    some = slice(None, None, copies)
+    agreement = verdicts(
+        loop, goal, states[some], forces[some], 1.0, config.recovery, config.threshold
+    )
+    return result, agreement
+
+
+def _pairs(values: Complex) -> list[list[float]]:
+    return [[float(v.real), float(v.imag)] for v in values]

@@ -1,0 +1,60 @@
+"""Figure of a search for an input signal: rewards by round, and outputs without and with it."""
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from mcmj.pictures.plotting import OUTPUT_STYLES, TITLES, draw_phase_plane, new_figure
+from mcmj.targets.limit_cycles import Target
+from mcmj.utils.validation import Array
+
+INPUT_COLOUR = "#2a9d3a"
+Run = tuple[Array, Array, Array, float]
+
+
+def drive_figure(target: Target, rewards: Array, before: Run, after: Run) -> Figure:
+    """Learning curve; outputs over time and phase plane without input and with the learned one.
+
+    Args:
+        rewards: (rounds, population) mean rewards of the episodes.
+        before, after: times (K,) [s], inputs (K,), outputs (K, 2), mean reward.
+    """
+    figure = new_figure(12.0, 6.2)
+    grid = figure.add_gridspec(2, 3, width_ratios=[1.1, 1.9, 1.0])
+    _draw_learning(figure.add_subplot(grid[:, 0]), rewards, before[3])
+    for row, (name, run) in enumerate((("without input", before), ("learned input", after))):
+        time_axes, plane = figure.add_subplot(grid[row, 1]), figure.add_subplot(grid[row, 2])
+        _draw_run(time_axes, run)
+        time_axes.set_title(f"{name}, from total rest: mean reward {run[3]:.2f}")
+        _, _, outputs, _ = run
+        draw_phase_plane(plane, outputs, target)
+        plane.set_title(TITLES.get(target.name, target.name) if row == 0 else "")
+        if row == 1:
+            time_axes.set_xlabel("time [s]")
+            time_axes.legend(
+                loc="upper center", bbox_to_anchor=(0.5, -0.15), ncols=3, frameon=False
+            )
+    return figure
+
+
+def _draw_learning(axes: Axes, rewards: Array, without: float) -> None:
+    rounds = 1 + np.arange(len(rewards))
+    axes.plot(rounds, rewards, ".", color="0.75", ms=4)
+    axes.plot(rounds, rewards.max(axis=1), "o-", color="black", label="best of the round")
+    axes.plot(rounds, np.median(rewards, axis=1), "s--", color="#1f4fd6", label="median")
+    axes.axhline(without, color="#d62728", ls=":", label="without input")
+    axes.set(xlabel="round", ylabel="mean reward of an episode", ylim=(0.0, 1.0))
+    axes.set_title(f"cross-entropy method, {rewards.shape[1]} episodes a round")
+    axes.legend(loc="lower right")
+
+
+def _draw_run(axes: Axes, run: Run) -> None:
+    times, inputs, outputs, _ = run
+    for c in range(outputs.shape[1]):
+        axes.plot(times, outputs[:, c], lw=1.2, **OUTPUT_STYLES[c % 2], label=f"$x_{c + 1}$")
+    largest = np.abs(inputs).max()
+    if largest > 0.0:
+        scaled = inputs * (np.abs(outputs).max() / largest)
+        label = f"input (largest: {largest:.1f})"
+        axes.fill_between(times, scaled, color=INPUT_COLOUR, alpha=0.3, lw=0, label=label)
+    axes.set(ylabel="outputs", xlim=(0.0, times[-1]))

@@ -1,0 +1,3 @@
+"""A nonlinear spring becomes another system by static feedback: error and order by integrator."""
+
+GROUP = "analysis"

@@ -1,0 +1,242 @@
+"""A nonlinear spring becomes another system by static feedback (Hauser et al. 2012, section 3).
+
+The error is that of the body's states against the target system by DOP853: RMS distance over
+a run, over the target's RMS radius. `order` is the slope of log error over log step.
+
+What limits it: the integrator's own order (1 Euler and the implicit ones, which do not know the
+feedback's derivative; 2 leapfrog; 4 RK4); an input is held over a step, which costs order 2 if
+sampled in its middle, order 1 if at its start; rounding, for x1 = l - l0 has the rounding of l;
+and, above all, how well K knows p and q.
+"""
+
+import warnings
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.integrate import solve_ivp
+
+from mcmj.analysis.emulation import emulation_body
+from mcmj.experiments.emulate.systems import SYSTEMS, System, mismatched, system, user_system
+from mcmj.metrics.convergence import Order, observed_order
+from mcmj.mjcf.write import INTEGRATORS
+from mcmj.simulation.simulation import Simulation
+from mcmj.utils.errors import (
+    DivergenceError,
+    InvalidArgumentError,
+    McmjError,
+    StabilityWarning,
+    UnknownNameError,
+)
+from mcmj.utils.validation import (
+    SHORTEST_STEP,
+    Array,
+    require_duration,
+    require_number,
+    require_seed,
+)
+
+REPORTED = 1.0  # ms: the step of the errors in metrics.json
+RTOL = 1e-13
+
+
+@dataclass(frozen=True)
+class Config:
+    """What to emulate.
+
+    Attributes:
+        targets: names of emulated_systems.SYSTEMS.
+        g: a G(x1, x2) of your own as text, as in --g="-x1 + (1 - x1**2) * x2"; target "user".
+        integrators: mcmj's names.
+        steps_ms: integration steps [ms], divisors of the horizon, 1 among them.
+        horizon: length of the runs [s].
+        mismatches: shares of p and q that K does not know, for the Van der Pol target under RK4.
+        seed: for the record; nothing is random here.
+    """
+
+    targets: tuple[str, ...] = tuple(SYSTEMS)
+    g: str | None = None
+    integrators: tuple[str, ...] = INTEGRATORS
+    steps_ms: tuple[float, ...] = (0.5, 1.0, 2.0, 4.0, 8.0, 16.0)
+    horizon: float = 8.0
+    mismatches: tuple[float, ...] = (1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1)
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        for kind, names, valid in (
+            ("target", self.targets, tuple(SYSTEMS)),
+            ("integrator", self.integrators, INTEGRATORS),
+        ):
+            for name in names:
+                if name not in valid:
+                    raise UnknownNameError(kind, name, valid)
+        require_seed("seed", self.seed)
+        for step in self.steps_ms:
+            require_number("steps_ms", step, 1e3 * SHORTEST_STEP)
+            require_duration("horizon", self.horizon, 1e-3 * step)
+            count = 1e3 * self.horizon / step
+            if abs(count - round(count)) > 1e-9:
+                raise InvalidArgumentError(
+                    "steps_ms", f"divisors of the horizon {self.horizon:g} s", f"{step:g} ms"
+                )
+        if REPORTED not in self.steps_ms:
+            raise InvalidArgumentError("steps_ms", "1 ms among them", self.steps_ms)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """All targets, the user's too."""
+        return self.targets if self.g is None else (*self.targets, "user")
+
+
+@dataclass(frozen=True)
+class Cell:
+    """One target, integrator and step: the error, infinite where it blew up."""
+
+    error: float
+
+
+@dataclass(frozen=True)
+class Result:
+    """What was measured.
+
+    Attributes:
+        cells: [target][integrator][step_ms].
+        orders: [target][integrator], None where too few steps were usable.
+        orbits: [target] states (T, n) of the body at 1 ms under the last integrator, and those
+            of the target.
+        held_at_start: the driven target's errors [integrator][step_ms] with inputs sampled at
+            the start of each step instead of its middle.
+        mismatch_errors: Van der Pol's, by the share of p and q that K does not know.
+    """
+
+    config: Config
+    cells: dict[str, dict[str, dict[float, Cell]]]
+    orders: dict[str, dict[str, Order | None]]
+    orbits: dict[str, tuple[Array, Array]]
+    held_at_start: dict[str, dict[float, Cell]]
+    mismatch_errors: dict[float, float]
+
+    @property
+    def slopes(self) -> dict[str, dict[str, float | None]]:
+        """Observed order by target and integrator."""
+        return {t: {m: _slope(order) for m, order in o.items()} for t, o in self.orders.items()}
+
+    @property
+    def metrics(self) -> dict[str, object]:
+        """As written to metrics.json."""
+        table: dict[str, object] = {}
+        for target, methods in self.cells.items():
+            table[target] = {
+                name: {
+                    "error": steps[REPORTED].error,
+                    "order": self.slopes[target][name],
+                    "errors": {f"{step:g}": cell.error for step, cell in steps.items()},
+                }
+                for name, steps in methods.items()
+            }
+        table["input_held_from_start"] = {
+            name: {
+                "error": steps[REPORTED].error,
+                "order": _slope(observed_order({"driven": {name: steps}}, name)),
+            }
+            for name, steps in self.held_at_start.items()
+        }
+        table["mismatch"] = {f"{size:g}": error for size, error in self.mismatch_errors.items()}
+        return table
+
+
+def run(config: Config, *, on_targets: Callable[[int], object] = lambda targets: None) -> Result:
+    """Emulate every target under every integrator and step."""
+    systems = {name: system(name) for name in config.targets}
+    if config.g is not None:
+        systems["user"] = user_system(config.g)
+    cells, orbits = {}, {}
+    for name, one in systems.items():
+        cells[name] = _cells(config, one)
+        states = emulate(one, config.integrators[-1], REPORTED, config.horizon)
+        orbits[name] = (states, reference(one, REPORTED, config.horizon))
+        on_targets(1)
+    driven = systems.get("driven_duffing")
+    return Result(
+        config,
+        cells,
+        {t: {m: observed_order({t: cells[t]}, m) for m in config.integrators} for t in cells},
+        orbits,
+        _cells(config, driven, sample_at=0.0) if driven else {},
+        {size: _mismatch_error(config, size) for size in config.mismatches},
+    )
+
+
+def emulate(
+    one: System, integrator: str, step_ms: float, horizon: float, *, sample_at: float = 0.5
+) -> Array:
+    """States (T, n) of the body at t_k in MuJoCo, as the target has them.
+
+    Args:
+        sample_at: the input of a step is u at this share of it.
+
+    Raises:
+        DivergenceError: the body blew up.
+        McmjError: a mass came to the wall, where the line it moves on ends.
+    """
+    step, free = 1e-3 * step_ms, slice(1, None)  # node 0 is the wall
+    body = emulation_body(len(one.positions))
+    with warnings.catch_warnings():  # an unstable G is meant to be
+        warnings.simplefilter("ignore", StabilityWarning)
+        sim = Simulation(body, springs=one.law, integrator=integrator, timestep=step)
+    positions, velocities = body.positions.copy(), np.zeros_like(body.positions)
+    positions[free, 0] += one.positions
+    velocities[free, 0] = one.velocities
+    sim.set_state(positions, velocities)
+    count = round(horizon / step)
+    inputs = None
+    if one.drive is not None:
+        inputs = one.drive(step * (np.arange(count, dtype=np.float64) + sample_at))[:, None]
+    ran = sim.rollout(count, inputs=inputs, record=("lengths", "velocities"))
+    if ran.get("lengths").min() < 0.1 * body.rest_lengths.min():
+        raise McmjError("a mass came near the wall: choose a G whose x1 stays far above -100")
+    x1, x2 = ran.get("lengths") - body.rest_lengths, ran.get("velocities")[:, free, 0]
+    return x1 if one.states == "x" else np.hstack([x1, x2])
+
+
+def reference(one: System, step_ms: float, horizon: float) -> Array:
+    """States (T, n) of the target at t_k by DOP853."""
+    step = 1e-3 * step_ms
+    times = step * np.arange(round(horizon / step))
+    solution = solve_ivp(
+        one.rhs, (0.0, times[-1]), one.start, "DOP853", t_eval=times, rtol=RTOL, atol=RTOL
+    )
+    if not solution.success:
+        raise McmjError(f"the target system cannot be integrated: {solution.message}")
+    return solution.y.T
+
+
+def emulation_error(states: Array, wanted: Array) -> float:
+    """RMS distance of states (T, n) from the wanted ones, over the RMS radius of those."""
+    spread = ((wanted - wanted.mean(axis=0)) ** 2).sum(axis=1).mean()
+    return float(np.sqrt(((states - wanted) ** 2).sum(axis=1).mean() / spread))
+
+
+def _cells(config: Config, one: System, *, sample_at: float = 0.5) -> dict[str, dict[float, Cell]]:
+    wanted = {step: reference(one, step, config.horizon) for step in config.steps_ms}
+
+    def cell(integrator: str, step: float) -> Cell:
+        try:
+            states = emulate(one, integrator, step, config.horizon, sample_at=sample_at)
+        except DivergenceError:
+            return Cell(np.inf)
+        return Cell(emulation_error(states, wanted[step]))
+
+    return {
+        name: {step: cell(name, step) for step in config.steps_ms} for name in config.integrators
+    }
+
+
+def _mismatch_error(config: Config, size: float) -> float:
+    one = mismatched(size)
+    wanted = reference(one, REPORTED, config.horizon)
+    return emulation_error(emulate(one, "RK4", REPORTED, config.horizon), wanted)
+
+
+def _slope(order: Order | None) -> float | None:
+    return order.slope if order else None

@@ -1,0 +1,3 @@
+"""Open-loop filters against regression without a body, and a switch that needs feedback."""
+
+GROUP = "the paper"

@@ -1,0 +1,77 @@
+"""Figures of scripts/filters.py. Takes results, never simulates."""
+
+from collections.abc import Collection, Mapping
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from mcmj.pictures.plotting import OUTPUT_STYLES, TARGET_COLOUR, new_figure
+from mcmj.utils.validation import Array
+
+SHOWN_SECONDS, SHOWN_SYMBOLS = 3.0, 80
+TITLES = {
+    "volterra": "Quadratic Volterra operator",
+    "toolbox_narma": "The toolbox's NARMA, 1 ms",
+    "narma10": "NARMA-10",
+    "delayed_recall": "Delayed recall",
+}
+
+
+def filter_figure(
+    panels: Mapping[str, tuple[float, Array, Array, Mapping[str, float]]],
+    *,
+    in_symbols: Collection[str],
+) -> Figure:
+    """A row a task: outputs on targets, and the errors as bars.
+
+    Args:
+        panels: [task] spacing of the samples, targets (M, 1), outputs (M, 1), errors by name.
+        in_symbols: tasks whose samples are counted, not timed.
+    """
+    figure = new_figure(12.5, 2.3 * len(panels) + 0.5)
+    grid = figure.subplots(len(panels), 2, squeeze=False, width_ratios=[3.2, 1.0])
+    for (name, (spacing, wanted, outputs, errors)), (left, right) in zip(
+        panels.items(), grid, strict=True
+    ):
+        counted = name in in_symbols
+        shown = round((SHOWN_SYMBOLS if counted else SHOWN_SECONDS) / spacing)
+        places = spacing * np.arange(len(wanted))[:shown]
+        drawn = "steps-mid" if counted else "default"
+        left.plot(places, wanted[:shown], color=TARGET_COLOUR, lw=3, alpha=0.55, drawstyle=drawn,
+                  label="target")  # fmt: skip
+        left.plot(places, outputs[:shown], lw=1.2, drawstyle=drawn, **OUTPUT_STYLES[0],
+                  label="body")  # fmt: skip
+        left.set(xlabel="symbol" if counted else "time [s]", xlim=(places[0], places[-1]))
+        left.set_title(f"{TITLES.get(name, name)}, held-out data")
+        kinds = {"body": "", "input and\ndelays": "baseline_", "input\nonly": "input_only_"}
+        values = [errors[f"{kind}nrmse_std"] for kind in kinds.values()]
+        bars = right.bar(list(kinds), values, color=["black", "0.6", "0.8"], width=0.6)
+        right.bar_label(bars, fmt="%.2g", fontsize=8)
+        right.set(ylim=(0, 1.2), ylabel="NRMSE (std)")
+    grid[0, 0].legend(frameon=True, framealpha=0.9, ncols=2, loc="upper right", fontsize=8)
+    return figure
+
+
+def switch_figure(
+    timestep: float,
+    inputs: Array,
+    targets: Array,
+    outputs: Mapping[str, Array],
+    held: Mapping[str, float],
+) -> Figure:
+    """The switch's pulses, and the outputs (T, 1) with and without feedback on the target."""
+    figure = new_figure(12.5, 6.0)
+    axes = figure.subplots(3, 1, sharex=True, height_ratios=[0.6, 1, 1])
+    times = timestep * np.arange(len(inputs))
+    axes[0].plot(times, inputs, color="0.3", lw=1)
+    axes[0].set(ylabel="input", title="Pulses")
+    names = {"feedback": "With feedback", "open": "Without feedback"}
+    for panel, (name, title) in zip(axes[1:], names.items(), strict=True):
+        panel.plot(times, targets, color=TARGET_COLOUR, lw=3, alpha=0.55, label="target")
+        panel.plot(times, outputs[name], lw=1.0, **OUTPUT_STYLES[0], label="output")
+        share = 100 * held[name]
+        panel.set_title(f"{title}: right throughout {share:.0f} % of the pauses")
+        panel.set(ylabel="output", ylim=(-2, 2))
+    axes[1].legend(frameon=True, framealpha=0.9, ncols=2, loc="upper right", fontsize=8)
+    axes[-1].set(xlabel="time [s]", xlim=(times[0], times[-1]))
+    return figure

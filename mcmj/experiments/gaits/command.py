@@ -1,0 +1,117 @@
+"""The command: gaits."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+from rich.console import Console
+from rich.table import Table
+
+from mcmj.experiments.command_line import Output, main
+from mcmj.experiments.gaits.config import Config, total_steps
+from mcmj.experiments.gaits.figure import gait_diagram, switch_figure
+from mcmj.experiments.gaits.result import Result
+from mcmj.experiments.gaits.run import run
+from mcmj.mjcf.write import to_mjcf
+from mcmj.pictures.plotting import save
+from mcmj.utils import files
+from mcmj.utils.progress import progress_bar
+
+
+def work(config: Config, output: Output, out: Path) -> None:
+    with progress_bar("teaching, switching", total_steps(config), quiet=output.quiet) as on_steps:
+        result = run(config, on_steps=on_steps)
+    write(result, out)
+    if not output.quiet:
+        show(result, out)
+
+
+def write(result: Result, out: Path) -> None:
+    """metrics.json, body.xml with all readouts, trajectory.npz and the figures."""
+    config, first = result.config, result.first
+    readouts = result.readouts
+    xml = to_mjcf(
+        result.body,
+        timestep=config.timestep,
+        w_out=next(iter(readouts.values()), None),
+        readouts=readouts,
+        provenance={"body": first.source, "config": files.plain(config)},
+    )
+    files.write_text(out / "body.xml", xml)
+    arrays = {"timestep": np.array(config.timestep)}
+    for name, gait in first.gaits.items():
+        arrays[f"{name}/outputs"] = gait.free.outputs
+        arrays[f"{name}/from_rest"] = gait.from_rest.outputs
+    for (start, end), switch in first.switches.items():
+        arrays[f"{start}_to_{end}/outputs"] = switch.outputs
+    files.write_arrays(out / "trajectory.npz", arrays, config, config.first_seed)
+    draw(result, out)
+    files.write_metrics(out / "metrics.json", "gaits", config, config.first_seed, result.metrics)
+
+
+def draw(result: Result, out: Path) -> None:
+    """The switches from the first gait in the manner of Fig. 9; the gait diagram."""
+    config, first = result.config, result.first
+    switches = {
+        f"{start} to {end}": (
+            first.gaits[start].target, first.gaits[end].target,
+            switch.outputs, switch.switched, switch.time,
+        )
+        for (start, end), switch in first.switches.items()
+        if start == config.gaits[0] and len(switch.outputs)
+    }  # fmt: skip
+    if switches:
+        save(switch_figure(switches, config.timestep), out / "gaits.png")
+    gaits = {
+        f"{name}, period {gait.target.period:.2f} s": (gait.target, gait.free.outputs)
+        for name, gait in first.gaits.items()
+        if len(gait.free.outputs)
+    }
+    if gaits:
+        save(gait_diagram(gaits, switches, config.timestep), out / "gait_diagram.png")
+
+
+def show(result: Result, out: Path) -> None:
+    config, first = result.config, result.first
+    table = Table(title=f"last {config.window:g} s of {config.free_run:g} s in closed loop")
+    columns = ("orbit error", "period error", "phase lag error", "duty factor", "from rest after")
+    table.add_column("gait")
+    for column in columns:
+        table.add_column(column, justify="right")
+    for name, gait in first.gaits.items():
+        errors = gait.free.errors
+        table.add_row(
+            name,
+            f"{100 * errors['orbit_error']:.3f} %",
+            f"{100 * errors['period_error']:.3f} %",
+            f"{errors['phase_lag_error']:.4f}",
+            " ".join(f"{duty:.3f}" for duty in gait.free.duty_factors),
+            f"{gait.from_rest.time:.1f} s",
+        )
+    switches = Table(title=f"{config.after:g} s after a switch: orbit error (switching time)")
+    switches.add_column("from \\ to")
+    for name in config.gaits:
+        switches.add_column(name, justify="right")
+    for start in config.gaits:
+        cells = []
+        for end in config.gaits:
+            run = first.switches.get((start, end))
+            error = "" if run is None else f"{100 * run.errors['orbit_error']:.3f} %"
+            cells.append(error if run is None else f"{error} ({run.time:.1f} s)")
+        switches.add_row(start, *cells)
+    console = Console()
+    console.print(table)
+    if first.switches:
+        console.print(switches)
+    if config.seeds > 1:
+        labels = {"free_run": "run all gaits", "switch": "make all switches",
+                  "from_rest": "start all gaits from rest", "all": "do all of it"}  # fmt: skip
+        for kind, label in labels.items():
+            good = sum(bool(one[kind]) for one in result.outcomes)
+            console.print(f"{good} of {config.seeds} bodies {label}")
+    console.print(f"results in {out}")
+
+
+def command(arguments: Sequence[str] | None = None) -> None:
+    """Run it with the arguments of a command line."""
+    main("gaits", Config, work, arguments)

@@ -1,0 +1,174 @@
+"""Figures of gaits: outputs around a switch of the readout (Fig. 9 of the paper), gait diagrams."""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+
+from mcmj.metrics.gaits import in_stance
+from mcmj.pictures.plotting import TARGET_COLOUR, best_phase, new_figure
+from mcmj.targets.gaits import LEGS
+from mcmj.targets.limit_cycles import Target
+from mcmj.utils.validation import Array
+
+SWITCH_COLOUR = "#e07b00"
+ARRIVED_COLOUR = "#1f4fd6"
+SPACING = 2.6  # between the legs' outputs, which are within +-1.1
+THIN = 10  # one sample in so many is drawn
+BAR = 0.36  # height of a stance bar
+Switch = tuple[Target, Target, Array, int, float]
+
+
+def switch_figure(switches: Mapping[str, Switch], timestep: float) -> Figure:
+    """Fig. 9: the four outputs around each switch, on the target before it and the one after.
+
+    Args:
+        switches: by title: target before, target after, outputs (T, 4), row of the switch,
+            switching time [s].
+        timestep: of the outputs [s].
+    """
+    figure = new_figure(11.0, 2.9 * len(switches) + 0.5)
+    column = figure.subplots(len(switches), 1, squeeze=False)[:, 0]
+    for (title, switch), axes in zip(switches.items(), column, strict=True):
+        _, after, outputs, row, arrival = switch
+        times = _times(outputs, row, timestep)
+        first, last = _shown(after, times, arrival)
+        rows = slice(np.searchsorted(times, first), np.searchsorted(times, last), THIN)
+        levels = SPACING * np.arange(len(LEGS))[::-1]
+        for wanted_times, wanted in _targets(switch, timestep):
+            seen = (wanted_times >= first) & (wanted_times <= last)
+            axes.plot(
+                wanted_times[seen], wanted[seen] + levels, color=TARGET_COLOUR, lw=3, alpha=0.55
+            )
+        axes.plot(times[rows], outputs[rows] + levels, color="black", lw=1.1)
+        axes.set_yticks(levels, LEGS)
+        axes.set(xlim=(first, last), ylabel="output of leg")
+        axes.set_title(f"{title}: {_when(arrival)}")
+        _mark(axes, arrival)
+    column[-1].set_xlabel("time after the switch of the readout [s]")
+    figure.legend(
+        handles=[
+            Line2D([], [], color=TARGET_COLOUR, lw=3, alpha=0.55, label="target"),
+            Line2D([], [], color="black", label="output"),
+            *_mark_handles(),
+        ],
+        loc="outside upper center", ncols=4, frameon=False,
+    )  # fmt: skip
+    return figure
+
+
+def gait_diagram(
+    gaits: Mapping[str, tuple[Target, Array]],
+    switches: Mapping[str, Switch],
+    timestep: float,
+    *,
+    shown: float = 12.0,
+) -> Figure:
+    """Stance bars of each leg: the gaits beside their targets, and around switches.
+
+    Args:
+        gaits: by title: target, outputs (T, 4) on it.
+        switches: as for switch_figure.
+        timestep: of the outputs [s].
+        shown: time of each gait [s].
+    """
+    wide = -(-len(gaits) // 2)
+    figure = new_figure(12.0, 1.75 * (wide + len(switches)) + 0.8)
+    grid = figure.add_gridspec(wide + len(switches), 2)
+    for place, (title, (target, outputs)) in enumerate(gaits.items()):
+        axes = figure.add_subplot(grid[place // 2, place % 2])
+        last = outputs[-round(shown / timestep) :]
+        times = _times(last, 0, timestep)
+        wanted = target.sample(times + best_phase(last, target, times))
+        _bars(axes, times, wanted, TARGET_COLOUR, below=True)
+        _bars(axes, times, last, "black")
+        _legs(axes, title, (0.0, shown))
+        axes.set_xlabel("time [s]" if place >= len(gaits) - 2 else "")
+    for place, (title, switch) in enumerate(switches.items()):
+        axes = figure.add_subplot(grid[wide + place, :])
+        _, after, outputs, row, arrival = switch
+        times = _times(outputs, row, timestep)
+        for wanted_times, wanted in _targets(switch, timestep):
+            _bars(axes, wanted_times, wanted, TARGET_COLOUR, below=True)
+        _bars(axes, times, outputs, "black")
+        _legs(axes, f"{title}: {_when(arrival)}", _shown(after, times, arrival))
+        _mark(axes, arrival)
+    if switches:
+        figure.axes[-1].set_xlabel("time after the switch of the readout [s]")
+    handles = [
+        Patch(color="black", label="stance (output falls)"),
+        Patch(color=TARGET_COLOUR, alpha=0.55, label="target's stance"),
+        *(_mark_handles() if switches else ()),
+    ]
+    figure.legend(handles=handles, loc="outside upper center", ncols=4, frameon=False)
+    return figure
+
+
+def _times(outputs: Array, origin: int, timestep: float) -> Array:
+    """Of samples, with 0 at a row [s]."""
+    return np.arange(-origin, len(outputs) - origin, dtype=np.float64) * timestep
+
+
+def _shown(after: Target, times: Array, arrival: float) -> tuple[float, float]:
+    """Times around a switch that are drawn: two periods before, and until well after arrival."""
+    end = arrival + 3 * after.period if np.isfinite(arrival) else np.inf
+    return max(times[0], -2 * after.period), min(times[-1], max(end, 6 * after.period))
+
+
+def _targets(switch: Switch, timestep: float) -> list[tuple[Array, Array]]:
+    """Times and values of the target before a switch, and of the one after, in best phase.
+
+    The first is fitted to the outputs before the switch, the second to the last periods.
+    """
+    before, after, outputs, row, _ = switch
+    parts = []
+    for target, begin, end, fitted in (
+        (before, 0, row, slice(max(0, row - round(2 * before.period / timestep)), row)),
+        (after, row, len(outputs), slice(-round(2 * after.period / timestep), None)),
+    ):
+        times = _times(outputs, row, timestep)
+        shift = best_phase(outputs[fitted], target, times[fitted])
+        drawn = times[begin:end:THIN]
+        parts.append((drawn, target.sample(drawn + shift)))
+    return parts
+
+
+def _bars(axes: Axes, times: Array, outputs: Array, colour: str, *, below: bool = False) -> None:
+    stance = in_stance(outputs)
+    for leg in range(len(LEGS)):
+        bottom = len(LEGS) - 1 - leg - (BAR if below else 0.0)
+        edges = np.flatnonzero(np.diff(np.r_[0, stance[:, leg].astype(int), 0]))
+        spans = [
+            (times[a], times[min(b, len(times) - 1)] - times[a]) for a, b in edges.reshape(-1, 2)
+        ]
+        axes.broken_barh(
+            spans, (bottom, BAR), facecolors=colour, alpha=0.55 if below else 1.0, lw=0
+        )
+
+
+def _legs(axes: Axes, title: str, limits: Sequence[float]) -> None:
+    axes.set_yticks(np.arange(len(LEGS))[::-1], LEGS)
+    axes.set(xlim=limits, ylim=(-0.6, len(LEGS) - 0.4))
+    axes.set_title(title)
+    axes.spines[["left", "right", "top"]].set_visible(False)
+    axes.tick_params(axis="y", length=0)
+
+
+def _when(arrival: float) -> str:
+    return f"on the new orbit after {arrival:.1f} s" if np.isfinite(arrival) else "does not arrive"
+
+
+def _mark(axes: Axes, arrival: float) -> None:
+    axes.axvline(0.0, color=SWITCH_COLOUR, lw=1.8)
+    if np.isfinite(arrival):
+        axes.axvline(arrival, color=ARRIVED_COLOUR, lw=1.4, ls=":")
+
+
+def _mark_handles() -> list[Line2D]:
+    return [
+        Line2D([], [], color=SWITCH_COLOUR, lw=1.8, label="readout switched"),
+        Line2D([], [], color=ARRIVED_COLOUR, lw=1.4, ls=":", label="within 5 % from here on"),
+    ]

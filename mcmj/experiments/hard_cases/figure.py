@@ -1,0 +1,39 @@
+"""The figure of scripts/hard_cases.py: stable steps, measured and predicted."""
+
+from collections.abc import Mapping
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from mcmj.pictures.plotting import TARGET_COLOUR, TASK_COLOURS, new_figure
+
+PLAIN_STEP = 1e-3  # s: what a simulation takes unless told otherwise
+TOP = 2.0  # s: unbounded steps are drawn here
+
+
+def step_figure(steps: Mapping[str, Mapping[str, tuple[float, float, float, float]]]) -> Figure:
+    """One panel an integrator, one row a case.
+
+    Args:
+        steps: integrator -> case -> (measured, at rest, safe, blow-up) [s].
+    """
+    figure = new_figure(2.2 * len(steps) + 1.8, 4.6)
+    axes = figure.subplots(1, len(steps), sharex=True, sharey=True, squeeze=False)[0]
+    for panel, (integrator, cases) in zip(axes, steps.items(), strict=True):
+        rows = np.arange(len(cases))
+        measured, at_rest, safe, blow_up = np.minimum(np.array(list(cases.values())).T, TOP)
+        panel.hlines(rows, safe, blow_up, color=TASK_COLOURS[0], alpha=0.35, lw=6,
+                     label="predicted in motion: safe to blow-up")  # fmt: skip
+        panel.plot(at_rest, rows, "|", color=TASK_COLOURS[2], ms=11, mew=2,
+                   label="predicted at rest")  # fmt: skip
+        panel.plot(measured, rows, "o", color=TASK_COLOURS[1], ms=4, label="measured")
+        panel.axvline(PLAIN_STEP, color=TARGET_COLOUR, ls="--", lw=1, label="1 ms")
+        panel.set(xscale="log", title=integrator, xlim=(1e-8, 1.6 * TOP))
+        panel.set_xticks([1e-7, 1e-5, 1e-3, 1e-1])
+        panel.set_yticks(rows, [name.replace("_", " ") for name in cases])
+        panel.grid(alpha=0.3)
+    axes[0].invert_yaxis()
+    figure.supxlabel("largest stable step [s]; at the right edge: any", fontsize=9)
+    handles, labels = axes[0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside upper center", ncols=4, frameon=False)
+    return figure

@@ -1,0 +1,118 @@
+"""What the limit-cycle experiment runs: its Config, and the body and readouts it asks for."""
+
+from dataclasses import asdict, dataclass, field
+
+from mcmj.core.body import Body
+from mcmj.core.options import DEFAULT_INTEGRATOR, ENGINES
+from mcmj.core.random_body import BodySettings, draw_body
+from mcmj.learning.free_run import WINDOW
+from mcmj.learning.lessons import Teaching
+from mcmj.metrics import orbits
+from mcmj.mjcf.bundled import open_body
+from mcmj.targets.limit_cycles import TARGETS, Target, target
+from mcmj.utils.errors import InvalidArgumentError, UnknownNameError
+from mcmj.utils.validation import Array, require_duration, require_number, require_timestep
+
+Found = tuple[Body, dict[str, Array], dict[str, object]]  # what get_body gives
+
+
+@dataclass(frozen=True)
+class Config:
+    """What to run.
+
+    Attributes:
+        task: van_der_pol, quadratic, lissajous, or all three (by the same body).
+        body: a body file, or the name of a body that comes with mcmj; default: the general
+            body, unless a seed or changed settings ask for a new random one. If the file
+            holds a readout for the task, nothing is taught.
+        seed: of the random body and of the noise; default 0.
+        free_run: length of the free run in closed loop [s].
+        window: the errors are those of this last part of it [s].
+        timestep: control and physics step [s].
+        integrator: Euler, RK4, implicit, implicitfast, discrete or leapfrog.
+        engine: mujoco, or twin: faster, the same to rounding, no video.
+        windows: length of the consecutive windows of the free run whose errors are given too
+            [s]; 0: none.
+        measure_cost: measure what a step in closed loop costs in MuJoCo.
+        settings: what a random body is drawn from.
+        teaching: how the readout is taught.
+    """
+
+    task: str = "all"
+    body: str | None = None
+    seed: int | None = None
+    free_run: float = 120.0
+    window: float = 20.0
+    timestep: float = 1e-3
+    integrator: str = DEFAULT_INTEGRATOR
+    engine: str = "mujoco"
+    windows: float = WINDOW
+    measure_cost: bool = True
+    settings: BodySettings = field(default_factory=BodySettings)
+    teaching: Teaching = field(default_factory=Teaching)
+
+    def __post_init__(self) -> None:
+        if self.task not in (*TARGETS, "all"):
+            raise UnknownNameError("task", self.task, [*TARGETS, "all"])
+        require_timestep("timestep", self.timestep)
+        require_duration("free_run", self.free_run, self.timestep)
+        require_number("window", self.window, 0.0, self.free_run, open_low=True)
+        if self.windows != 0.0:
+            longest = max(target(name).period for name in self.tasks)
+            require_number("windows", self.windows, orbits.PERIODS_NEEDED * longest)
+        if self.engine not in ENGINES:
+            raise UnknownNameError("engine", self.engine, ENGINES)
+        if self.body is not None and self.settings != BodySettings():
+            changed = [
+                k for k, v in asdict(BodySettings()).items() if getattr(self.settings, k) != v
+            ]
+            raise InvalidArgumentError(
+                ", ".join(changed), "no settings beside a body, which has its own", self.body
+            )
+
+    @property
+    def tasks(self) -> tuple[str, ...]:
+        """Names of the targets to learn."""
+        return tuple(TARGETS) if self.task == "all" else (self.task,)
+
+    @property
+    def noise_seed(self) -> int:
+        """The seed, or its default."""
+        return 0 if self.seed is None else self.seed
+
+
+def get_body(config: Config) -> Found:
+    """The config's body, the readouts that came with it, and where it comes from."""
+    if config.body is None and (config.seed is not None or config.settings != BodySettings()):
+        body = draw_body(config.noise_seed, config.settings)
+        return body, {}, {"seed": config.noise_seed, "settings": asdict(config.settings)}
+    stored = open_body("general" if config.body is None else config.body)
+    stored.take(timestep=config.timestep, integrator=config.integrator)
+    readouts = stored.readouts
+    if not readouts and stored.w_out is not None and config.task != "all":
+        readouts = {config.task: stored.w_out}
+    return stored.body, readouts, stored.provenance
+
+
+def total_steps(config: Config) -> int:
+    """Control steps of a whole run, for a progress bar."""
+    seconds = config.teaching.total + config.free_run
+    return len(config.tasks) * round(seconds / config.timestep)
+
+
+def check_task(config: Config, body: Body, wanted: Target) -> None:
+    """Check that a body has the channels, and the window the length, that a target needs.
+
+    Raises:
+        InvalidArgumentError: one of them does not.
+    """
+    if body.n_outputs != wanted.n_outputs:
+        raise InvalidArgumentError(
+            "body", f"{wanted.n_outputs} feedback channels for {wanted.name}", body.n_outputs
+        )
+    if config.window < orbits.PERIODS_NEEDED * wanted.period:
+        raise InvalidArgumentError(
+            "window",
+            f"at least {orbits.PERIODS_NEEDED} periods of {wanted.period:.4g} s ({wanted.name})",
+            f"{config.window:g} s",
+        )

@@ -1,0 +1,40 @@
+"""What the closed loop costs beside a bare mj_step loop."""
+
+import mujoco
+import numpy as np
+
+from mcmj.core.body import Body
+from mcmj.simulation.simulation import Simulation
+from mcmj.utils.timing import interleaved_seconds, median_ratio
+from mcmj.utils.validation import Array
+
+
+def closed_loop_cost(
+    body: Body,
+    w_out: Array,
+    *,
+    timestep: float,
+    integrator: str,
+    steps: int = 4000,
+    repeats: int = 7,
+) -> tuple[float, float]:
+    """Steps a second in closed loop with lengths and outputs recorded, and its cost ratio.
+
+    The ratio is the median over `repeats` of the time for `steps` control steps through
+    Simulation.rollout, over the time of as many bare mj_step of the same model from the same
+    state with the loop open, measured in turns.
+    """
+    simulation = Simulation(body, w_out=w_out, timestep=timestep, integrator=integrator)
+    bare, free = mujoco.MjData(simulation.model), body.free
+
+    def step_bare() -> None:
+        state = simulation.state
+        bare.qpos[:] = (state.positions - body.positions)[free].ravel()
+        bare.qvel[:] = state.velocities[free].ravel()
+        mujoco.mj_step(simulation.model, bare, nstep=steps)
+
+    seconds = interleaved_seconds(
+        {"closed": lambda: simulation.rollout(steps), "bare": step_bare}, repeats
+    )
+    speed = steps / float(np.median(seconds["closed"]))
+    return speed, median_ratio(seconds, "closed", "bare")

@@ -1,0 +1,220 @@
+"""Fig. 5: one body learns a limit cycle by teacher forcing, then runs free in MuJoCo."""
+
+import hashlib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from mcmj.core.body import Body
+from mcmj.experiments.limit_cycle.config import Config, Found, check_task, get_body
+from mcmj.experiments.limit_cycle.loop_cost import closed_loop_cost
+from mcmj.learning.free_run import free_run, resume, window_errors
+from mcmj.learning.regression import Fit
+from mcmj.learning.teaching import synchronise, teach
+from mcmj.metrics import orbits
+from mcmj.mjcf.write import to_mjcf
+from mcmj.simulation.simulation import Simulation
+from mcmj.targets.limit_cycles import Target, target
+from mcmj.utils.checkpoint import Checkpoint
+from mcmj.utils.errors import DivergenceError
+from mcmj.utils.progress import OnSteps
+from mcmj.utils.threads import in_threads
+from mcmj.utils.validation import Array
+
+# what a search over many bodies leaves out, see mcmj.search.experiment
+SEARCH_DEFAULTS = {"windows": 0.0, "measure_cost": False}
+
+
+@dataclass(frozen=True)
+class TaskResult:
+    """One task: the fit (None if the readout came with the file), the free run, its errors.
+
+    Attributes:
+        times, outputs: (T,) [s] and (T, n_outputs) of the free run; its time goes on from
+            teacher forcing, so the target's value at the same moment is target.sample(times).
+        positions: (window, N, 2) of the nodes during the last window [m]; None from the twin.
+        windows: errors in consecutive windows, see mcmj.freerun.window_errors.
+    """
+
+    target: Target
+    w_out: Array
+    fit: Fit | None
+    times: Array
+    outputs: Array
+    positions: Array | None
+    errors: dict[str, float]
+    windows: dict[str, object]
+
+
+@dataclass(frozen=True)
+class Result:
+    """All tasks of one body, and what the closed loop costs, if that was measured."""
+
+    config: Config
+    body: Body
+    source: dict[str, object]
+    tasks: dict[str, TaskResult]
+    checkpoints: dict[str, Checkpoint]
+    steps_per_second: float | None
+    closed_loop_cost_ratio: float | None
+
+    @property
+    def readouts(self) -> dict[str, Array]:
+        """Readouts (L or L + 1, n_outputs) by task."""
+        return {name: task.w_out for name, task in self.tasks.items()}
+
+    @property
+    def metrics(self) -> dict[str, object]:
+        """As written to metrics.json."""
+        table: dict[str, object] = {}
+        for name, task in self.tasks.items():
+            fit = task.fit
+            table[name] = {
+                **task.errors,
+                "train_nrmse": fit.train_nrmse if fit else None,
+                "condition_number": fit.condition_number if fit else None,
+                "windows": task.windows,
+            }
+        table["steps_per_second"] = self.steps_per_second
+        table["closed_loop_cost_ratio"] = self.closed_loop_cost_ratio
+        return table
+
+
+def checkpoints(config: Config, folder: Path, found: Found) -> dict[str, Checkpoint]:
+    """Where the free runs of a config keep what they need to go on, one a task."""
+    body, readouts, _ = found
+    digest = hashlib.sha256(to_mjcf(body, readouts=readouts).encode()).hexdigest()
+    return {
+        name: Checkpoint(folder / f".checkpoint-{name}", [config, digest], body.n_outputs)
+        for name in config.tasks
+    }
+
+
+def run(
+    config: Config, *, folder: Path | None = None, on_steps: OnSteps = lambda steps: None
+) -> Result:
+    """Teach and run every task, and measure what the closed loop costs.
+
+    Args:
+        folder: where checkpoints are kept, and gone on from; the result's may be removed.
+        on_steps: called with the number of steps done after every chunk, for progress bars.
+
+    Raises:
+        DivergenceError: a simulation blew up.
+        BodyFileError, InvalidArgumentError: a body that cannot do the task.
+    """
+    found = body, _, source = get_body(config)
+    kept = {} if folder is None else checkpoints(config, folder, found)
+    tasks = {}
+    for name, outcome in run_tasks(config, found, kept, on_steps=on_steps).items():
+        if isinstance(outcome, DivergenceError):
+            raise outcome
+        tasks[name] = outcome
+    if not config.measure_cost:
+        return Result(config, body, source, tasks, kept, None, None)
+    w_out = next(iter(tasks.values())).w_out
+    speed, ratio = closed_loop_cost(
+        body, w_out, timestep=config.timestep, integrator=config.integrator
+    )
+    return Result(config, body, source, tasks, kept, speed, ratio)
+
+
+def run_tasks(
+    config: Config,
+    found: Found,
+    kept: Mapping[str, Checkpoint] = {},
+    *,
+    on_steps: OnSteps = lambda steps: None,
+) -> dict[str, TaskResult | DivergenceError]:
+    """Teach and run every task, on several threads; a task that blew up is its error.
+
+    Args:
+        found: what `get_body` gave.
+        kept: of `checkpoints`, to go on from.
+
+    Raises:
+        BodyFileError, InvalidArgumentError: a body that cannot do the task.
+    """
+    body, readouts, _ = found
+    targets = {name: target(name) for name in config.tasks}
+    for wanted in targets.values():
+        check_task(config, body, wanted)
+
+    def outcome(name: str, report: OnSteps) -> TaskResult | DivergenceError:
+        try:
+            return _run_task(
+                config, body, targets[name], readouts.get(name), kept.get(name), report
+            )
+        except DivergenceError as error:
+            return error
+
+    return dict(zip(targets, in_threads(outcome, list(targets), on_steps), strict=True))
+
+
+def _run_task(
+    config: Config,
+    body: Body,
+    wanted: Target,
+    w_out: Array | None,
+    checkpoint: Checkpoint | None,
+    on_steps: OnSteps,
+) -> TaskResult:
+    simulation = Simulation(
+        body, timestep=config.timestep, integrator=config.integrator, engine=config.engine
+    )
+    resumed = None if checkpoint is None else resume(simulation, checkpoint)
+    if resumed is None:
+        done, fit = None, _ready(simulation, config, wanted, w_out, on_steps)
+    else:
+        done, fit = resumed
+        on_steps(round(config.teaching.total / config.timestep) + len(done))
+    total, last = (round(s / config.timestep) for s in (config.free_run, config.window))
+    first = free_run(
+        simulation, total - last, done=done, checkpoint=checkpoint, fit=fit, on_steps=on_steps
+    )
+    seen = ("positions",) if config.engine == "mujoco" else ()
+    end = simulation.rollout(last, record=("outputs", *seen))
+    on_steps(last)
+    outputs = np.concatenate([first, end.get("outputs")])
+    readout = simulation.w_out
+    assert readout is not None
+    start = round(simulation.time / config.timestep) - total
+    return TaskResult(
+        target=wanted,
+        w_out=readout,
+        fit=fit,
+        times=config.timestep * np.arange(start, start + total, dtype=np.float64),
+        outputs=outputs,
+        positions=end.positions,
+        errors=_errors(outputs[-last:], config.timestep, wanted),
+        windows=(
+            window_errors(outputs, config.timestep, wanted, length=config.windows)
+            if config.windows
+            else {}
+        ),
+    )
+
+
+def _ready(
+    simulation: Simulation,
+    config: Config,
+    wanted: Target,
+    w_out: Array | None,
+    on_steps: OnSteps,
+) -> Fit | None:
+    """Teach, or bring onto the target a body that has its readout already."""
+    if w_out is None:
+        return teach(simulation, wanted, config.teaching, config.noise_seed, on_steps=on_steps)
+    synchronise(simulation, wanted, config.teaching.washout)
+    simulation.set_readout(w_out)
+    return None
+
+
+def _errors(outputs: Array, timestep: float, wanted: Target) -> dict[str, float]:
+    return {
+        "orbit_error": orbits.orbit_error(outputs, wanted),
+        "period_error": orbits.relative_period_error(outputs, timestep, wanted),
+        "amplitude_error": orbits.relative_amplitude_error(outputs, wanted),
+    }

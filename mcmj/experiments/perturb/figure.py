@@ -1,0 +1,139 @@
+"""Figures of disturbed rhythms, in the manner of the paper's Figs. 6 and 7."""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from mcmj.metrics.orbits import ORBIT_POINTS
+from mcmj.pictures.plotting import OUTPUT_STYLES, TARGET_COLOUR, TITLES, new_figure
+from mcmj.targets.limit_cycles import Target
+from mcmj.utils.validation import Array
+
+PHASE_COLOURS = ("black", "#e07b00", "#1f4fd6")  # undisturbed, disturbed, free again
+PHASE_NAMES = ("undisturbed", "disturbed", "free again")
+NAMES = {
+    "frozen_x1": "Output $x_1$ frozen",
+    "frozen_x2": "Output $x_2$ frozen",
+    "random_forces": "Constant random forces on all nodes",
+    "length_noise": "White noise on all lengths",
+}
+Run = tuple[Array, Array, Array, Sequence[int], float, float]
+
+
+def perturb_figure(target: Target, runs: Mapping[str, Run], *, shown: float = 15.0) -> Figure:
+    """Fig. 6: one row a perturbation; outputs over time, and the phase plane in the same colours.
+
+    Args:
+        runs: by name: times (T,) [s], outputs (T, 2) as fed back, outputs (T, 2) without
+            noise, boundaries of the three phases (rows), orbit error, recovery time [s].
+            Where outputs are noisy they are drawn pale, those without noise on top.
+        shown: the free run after the disturbance is drawn for this long at least [s].
+    """
+    figure = new_figure(12.0, 2.7 * len(runs) + 0.6)
+    axes = figure.subplots(len(runs), 2, width_ratios=[3.0, 1.0], squeeze=False)
+    for (name, run), (time_axes, plane) in zip(runs.items(), axes, strict=True):
+        noisy = name == "length_noise"
+        _draw_run(time_axes, plane, target, run, shown, noisy=noisy)
+        *_, error, recovery = run
+        back = f"back after {recovery:.1f} s" if np.isfinite(recovery) else "not back"
+        time_axes.set_title(f"{NAMES.get(name, name)}: {back}")
+        plane.set_title(f"orbit error in the end {100 * error:.2f} %")
+    axes[-1, 0].set_xlabel("time in closed loop [s]")
+    axes[-1, 1].set_xlabel("$x_1$")
+    phases = zip(PHASE_COLOURS, PHASE_NAMES, strict=True)
+    handles = [
+        Line2D([], [], color=TARGET_COLOUR, lw=3, alpha=0.55, label="target orbit"),
+        *(Line2D([], [], color=colour, label=name) for colour, name in phases),
+        *(Line2D([], [], color="black", ls=OUTPUT_STYLES[c]["ls"], label=f"$x_{c + 1}$")
+          for c in range(2)),
+    ]  # fmt: skip
+    figure.legend(handles=handles, loc="outside upper center", ncols=6, frameon=False)
+    return figure
+
+
+def _draw_run(
+    time_axes: Axes, plane: Axes, target: Target, run: Run, shown: float, *, noisy: bool
+) -> None:
+    times, fed, clean, boundaries, _, recovery = run
+    outputs = clean if noisy else fed
+    orbit = target.orbit(ORBIT_POINTS)
+    plane.plot(*orbit[np.r_[:ORBIT_POINTS, 0]].T, color=TARGET_COLOUR, lw=3.5, alpha=0.55)
+    if len(times):
+        _, begin, end = (float(times[row]) for row in boundaries[:3])
+        time_axes.axvspan(begin, end, color=PHASE_COLOURS[1], alpha=0.15, lw=0)
+        if noisy:
+            window = slice(boundaries[1], boundaries[2])
+            time_axes.plot(times[window], fed[window], color=PHASE_COLOURS[1], lw=0.3, alpha=0.25)
+            plane.plot(*fed[window].T, ",", color=PHASE_COLOURS[1], alpha=0.15)
+        for colour, first, last in zip(PHASE_COLOURS, boundaries, boundaries[1:], strict=False):
+            rows = slice(first, last + 1)
+            for c in range(2):
+                time_axes.plot(times[rows], outputs[rows, c], color=colour, lw=1.1,
+                               ls=OUTPUT_STYLES[c]["ls"])  # fmt: skip
+            plane.plot(*outputs[rows].T, color=colour, lw=0.7)
+        if np.isfinite(recovery):
+            time_axes.axvline(end + recovery, color=PHASE_COLOURS[2], lw=1, ls=":")
+        last_shown = end + max(shown, 1.3 * recovery if np.isfinite(recovery) else 0.0)
+        time_axes.set_xlim(times[0], min(times[-1], last_shown))
+    reach = 2.0 * np.abs(orbit).max(axis=0)  # noise may be larger than the picture
+    time_axes.set(ylim=(-reach.max(), reach.max()), ylabel="outputs")
+    plane.set(aspect="equal", ylabel="$x_2$")
+    plane.set(xlim=(-reach[0], reach[0]), ylim=(-reach[1], reach[1]))
+
+
+def tolerance_figure(amplitudes: Sequence[float], errors: Array, tolerance: float) -> Figure:
+    """Orbit error after 10 s of length noise against its amplitude; errors (bodies, amplitudes)."""
+    figure = new_figure(7.0, 4.0)
+    axes = figure.add_subplot()
+    capped = np.minimum(errors, 2.0)  # everything worse, blow-ups too, is drawn here
+    axes.loglog(amplitudes, capped.T, ".-", color="0.7", lw=0.8, ms=4)
+    axes.loglog(amplitudes, np.median(capped, axis=0), "o-", color="black", label="median")
+    axes.axhline(tolerance, color=TARGET_COLOUR, ls="--", lw=1, label="recovered below")
+    good = (errors < tolerance).sum(axis=0)
+    for amplitude, count in zip(amplitudes, good, strict=True):
+        axes.annotate(f"{count}/{len(errors)}", (amplitude, 1.0), (0, 3), ha="center", fontsize=8,
+                      xycoords=("data", "axes fraction"), textcoords="offset points")  # fmt: skip
+    axes.set(xlabel="noise on every length, standard deviation [m]", ylabel="orbit error after")
+    axes.legend(frameon=False)
+    axes.grid(alpha=0.3)
+    return figure
+
+
+def swing_up_figure(runs: Mapping[str, tuple[Target, float, Array, float, float]]) -> Figure:
+    """Fig. 7: from rest onto the orbit; outputs over time and the phase plane, a row a task.
+
+    Args:
+        runs: by task: target, timestep [s], outputs (T, 2), orbit error, swing-up time [s].
+    """
+    figure = new_figure(12.0, 2.7 * len(runs) + 0.5)
+    axes = figure.subplots(len(runs), 2, width_ratios=[3.0, 1.0], squeeze=False)
+    for (name, run), (time_axes, plane) in zip(runs.items(), axes, strict=True):
+        target, timestep, outputs, error, swing_up = run
+        times = timestep * np.arange(len(outputs))
+        orbit = target.orbit(ORBIT_POINTS)
+        plane.plot(*orbit[np.r_[:ORBIT_POINTS, 0]].T, color=TARGET_COLOUR, lw=3.5, alpha=0.55)
+        arrived = np.isfinite(swing_up)
+        end = max(20.0, 1.5 * swing_up) if arrived else np.inf
+        rows = times <= end
+        for c in range(2):
+            time_axes.plot(times[rows], outputs[rows, c], lw=1.2, **OUTPUT_STYLES[c],
+                           label=f"$x_{c + 1}$")  # fmt: skip
+        plane.plot(*outputs[rows].T, color="black", lw=0.8)
+        if len(times):
+            plane.plot(*outputs[0], "o", color=PHASE_COLOURS[1], ms=6)
+        if arrived:
+            time_axes.axvline(swing_up, color=PHASE_COLOURS[1], lw=1.2, ls=":")
+        when = f"on the orbit after {swing_up:.1f} s" if arrived else "does not arrive"
+        time_axes.set_title(f"{TITLES.get(name, name)}, from total rest: {when}")
+        time_axes.set(ylabel="outputs")
+        time_axes.margins(x=0)
+        plane.set_title(f"orbit error in the end {100 * error:.2f} %")
+        plane.set(aspect="equal", ylabel="$x_2$")
+        plane.locator_params(axis="x", nbins=2)
+    axes[0, 0].legend(loc="upper left", frameon=False)
+    axes[-1, 0].set_xlabel("time in closed loop [s]")
+    axes[-1, 1].set_xlabel("$x_1$")
+    return figure

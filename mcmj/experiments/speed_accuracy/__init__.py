@@ -1,0 +1,3 @@
+"""The work-precision diagram: error against DOP853 over cost, every integrator, several bodies."""
+
+GROUP = "speed and accuracy"

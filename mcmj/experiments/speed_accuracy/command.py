@@ -1,0 +1,70 @@
+"""The command: speed_accuracy."""
+
+import csv
+import io
+from collections.abc import Sequence
+from pathlib import Path
+
+from rich.console import Console
+from rich.table import Table
+
+from mcmj.experiments.command_line import Output, main
+from mcmj.experiments.speed_accuracy.figure import work_precision_figure
+from mcmj.experiments.speed_accuracy.run import BASE, Config, Result, run
+from mcmj.pictures.plotting import save
+from mcmj.utils import files
+from mcmj.utils.progress import progress_bar
+
+
+def work(config: Config, output: Output, out: Path) -> None:
+    with progress_bar("bodies", len(config.bodies), quiet=output.quiet) as on_bodies:
+        result = run(config, on_bodies=on_bodies)
+    files.write_text(out / "speed_accuracy.csv", as_csv(result))
+    save(work_precision_figure(result.cells, result.orders), out / "speed_accuracy.png")
+    files.write_metrics(out / "metrics.json", "speed_accuracy", config, config.seed, result.metrics)
+    if not output.quiet:
+        show(result, out)
+
+
+def as_csv(result: Result) -> str:
+    """One row a body, method and step."""
+    text = io.StringIO()
+    table = csv.writer(text)
+    horizons = [f"position_error_at_{t:g}_s" for t in result.config.horizons]
+    costs = ["us_per_simulated_second", "cost_ratio_to_euler_1ms", "stable"]
+    table.writerow(["body", "method", "step_ms", *horizons, "length_error", *costs])
+    for body, methods in result.cells.items():
+        for method, steps in methods.items():
+            for step, cell in steps.items():
+                numbers = (cell.length_error, cell.us_per_second, cell.cost_ratio, cell.stable)
+                table.writerow([body, method, step, *cell.position_errors, *numbers])
+    return text.getvalue()
+
+
+def show(result: Result, out: Path) -> None:
+    console = Console(width=40 + 16 * len(result.cells))
+    step = 1.0 if 1.0 in result.config.steps_ms else result.config.steps_ms[0]
+    table = Table(title=f"error at {step:g} ms (cost over {BASE})")
+    table.add_column("method")
+    table.add_column("order")
+    for body in result.cells:
+        table.add_column(body, justify="right")
+    for method in result.config.methods:
+        order = result.orders[method]
+        cells = [methods[method][step] for methods in result.cells.values()]
+        table.add_row(
+            method,
+            f"{order.slope:.2f}" if order else "-",
+            *(f"{c.error:.1e} ({c.cost_ratio:.2g})" if c.stable else "-" for c in cells),
+        )
+    console.print(table)
+    console.print("orbit errors of readouts taught under A and run under B:")
+    for task, errors in result.attractor.items():
+        pairs = ", ".join(f"{name} {100 * error:.2f} %" for name, error in errors.items())
+        console.print(f"  {task}: {pairs}")
+    console.print(f"results in {out}")
+
+
+def command(arguments: Sequence[str] | None = None) -> None:
+    """Run it with the arguments of a command line."""
+    main("speed_accuracy", Config, work, arguments)

@@ -1,0 +1,79 @@
+"""The work-precision diagram. Takes results, never simulates."""
+
+from collections.abc import Mapping
+from typing import Protocol
+
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from mcmj.pictures.plotting import new_figure
+
+STYLES = {
+    "mujoco_Euler": ("black", "o-"),
+    "mujoco_leapfrog": ("#d62728", "o-"),
+    "mujoco_discrete": ("#2a9d3a", "s-"),
+    "mujoco_implicit": ("#8c6d31", "^-"),
+    "mujoco_implicitfast": ("#bda05a", "v-"),
+    "mujoco_RK4": ("#1f4fd6", "D-"),
+    "mujoco_Euler_hook": ("0.5", "o:"),
+    "mujoco_RK4_hook": ("#8aa4ee", "D:"),
+    "twin_semi_implicit_euler": ("black", "o--"),
+    "twin_leapfrog": ("#d62728", "o--"),
+    "twin_rk4": ("#1f4fd6", "D--"),
+    "twin_toolbox_euler": ("#9467bd", "x--"),
+    "twin_toolbox_rk": ("#e377c2", "+--"),
+}
+COLUMNS = 4
+
+
+class Point(Protocol):
+    """One method at one step."""
+
+    @property
+    def error(self) -> float:
+        """Relative position error."""
+
+    @property
+    def cost_ratio(self) -> float:
+        """Cost over that of Euler at 1 ms."""
+
+
+def work_precision_figure(
+    cells: Mapping[str, Mapping[str, Mapping[float, Point]]], orders: Mapping[str, object]
+) -> Figure:
+    """Error over cost, a panel a body, a curve a method, a point a step.
+
+    Args:
+        cells: [body][method][step_ms] with error and cost_ratio.
+        orders: observed order by method (objects with `slope`), or None.
+    """
+    rows = -(-(len(cells) + 1) // COLUMNS)
+    figure = new_figure(4.0 * COLUMNS, 3.9 * rows)
+    grid = figure.subplots(rows, COLUMNS, squeeze=False).ravel()
+    for axes, (body, methods) in zip(grid, cells.items(), strict=False):
+        _draw_body(axes, body, methods)
+    handles, labels = [], []
+    for method in next(iter(cells.values())):
+        colour, style = STYLES.get(method, ("0.7", ".-"))
+        (line,) = grid[-1].plot([], [], style, color=colour, ms=4)
+        order = orders.get(method)
+        slope = f"  (order {order.slope:.1f})" if order is not None else ""  # type: ignore[attr-defined]
+        handles.append(line)
+        labels.append(method.replace("_", " ", 1) + slope)
+    for axes in grid[len(cells) :]:
+        axes.axis("off")
+    grid[len(cells)].legend(handles, labels, loc="center", frameon=False, fontsize=8.5)
+    return figure
+
+
+def _draw_body(axes: Axes, body: str, methods: Mapping[str, Mapping[float, Point]]) -> None:
+    for method, steps in methods.items():
+        colour, style = STYLES.get(method, ("0.7", ".-"))
+        good = [(cell.cost_ratio, cell.error) for cell in steps.values() if cell.error < 1.0]
+        if good:
+            costs, errors = zip(*good, strict=True)
+            axes.loglog(costs, errors, style, color=colour, ms=4, lw=1.2)
+    axes.axvline(1.0, color="0.8", lw=1, zorder=0)
+    axes.set(xlabel="cost / Euler at 1 ms", ylabel="relative position error", ylim=(1e-13, 1.0))
+    axes.set_title(body.replace("_", " "))
+    axes.grid(alpha=0.25)

@@ -1,0 +1,7 @@
+"""The body walks: a quadruped in 3-D driven by its own compliant network, switched and pushed.
+
+With no arguments: the robot and the body that come with mcmj; walks, switches and pushes.
+--parts adapt recover steps: the ground as a part of the computer, other time steps.
+"""
+
+GROUP = "robots"

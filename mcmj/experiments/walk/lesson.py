@@ -1,0 +1,122 @@
+"""What all parts of the walking experiment share: the taught body, robots, the table of a walk."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from mcmj.core.body import Body
+from mcmj.experiments.walk.config import Config, get_body
+from mcmj.learning.regression import Fit
+from mcmj.robots import walk_metrics
+from mcmj.robots.ground_training import teach_on_ground
+from mcmj.robots.leg_readouts import LegReadout, teach_lift
+from mcmj.robots.quadruped import GRAVITY, STRIDES
+from mcmj.robots.walk_metrics import Walk
+from mcmj.robots.walker import Walker
+from mcmj.targets.gaits import gait_target
+from mcmj.utils.progress import OnSteps
+from mcmj.utils.threads import in_threads
+from mcmj.utils.validation import Array
+
+Table = dict[str, object]
+
+
+@dataclass(frozen=True)
+class Lesson:
+    """What all parts of the experiment start from: the body and its gaits.
+
+    Attributes:
+        gaits: taught without ground.
+        grounded: taught with the legs' loads in the body, if a part needs them.
+        fits: errors of both on what they were fitted to, for metrics.json.
+    """
+
+    config: Config
+    body: Body
+    gaits: dict[str, LegReadout]
+    grounded: dict[str, LegReadout] = field(default_factory=dict)
+    fits: Table = field(default_factory=dict)
+
+    def walker(self, **options: object) -> Walker:
+        """A new robot with the config's settings."""
+        config = self.config
+        given = {"timestep": config.timestep / config.pace, "pace": config.pace} | options
+        return Walker(self.body, config.robot, **given)  # type: ignore[arg-type]
+
+    def period(self, gait: str) -> float:
+        """Of a gait at the robot's pace [s]."""
+        return gait_target(gait).period / self.config.pace
+
+    @property
+    def couplings(self) -> dict[str, float]:
+        """Without and with the legs' loads in the body."""
+        return {"uncoupled": 0.0, "coupled": self.config.coupling}
+
+    def gait(self, name: str, coupling: float) -> LegReadout:
+        """The readouts for a body with that coupling."""
+        return self.grounded[name] if coupling else self.gaits[name]
+
+
+def learn(config: Config) -> Lesson:
+    """Take the config's body and gaits, teach it how far the legs are lifted, and the ground."""
+    body, readouts = get_body(config)
+
+    def lift(name: str, on_steps: OnSteps) -> tuple[LegReadout, Fit]:
+        stride = STRIDES.get(name)
+        return teach_lift(body, readouts[name], gait_target(name), stride=stride, engine="twin")
+
+    gaits, lifts = _taught(config, lift)
+    lesson = Lesson(config, body, gaits, fits={"lift_nrmse": lifts})
+    if not {"adapt", "recover"} & set(config.parts):
+        return lesson
+
+    def ground(name: str, on_steps: OnSteps) -> tuple[LegReadout, Fit]:
+        walker = lesson.walker(coupling=config.coupling)
+        return teach_on_ground(walker, gaits[name], gait_target(name), config.seed)
+
+    grounded, errors = _taught(config, ground)
+    return replace(lesson, grounded=grounded, fits=lesson.fits | {"ground_nrmse": errors})
+
+
+def _taught(
+    config: Config, teach: Callable[[str, OnSteps], tuple[LegReadout, Fit]]
+) -> tuple[dict[str, LegReadout], dict[str, float]]:
+    """Readouts and their errors by gait."""
+    results = dict(
+        zip(config.gaits, in_threads(teach, config.gaits, lambda steps: None), strict=True)
+    )
+    gaits = {name: gait for name, (gait, _) in results.items()}
+    return gaits, {name: fit.train_nrmse for name, (_, fit) in results.items()}
+
+
+def walk_table(lesson: Lesson, name: str, walk: Walk) -> Table:
+    """How a walk (its first copy) went after the first `settle` seconds."""
+    config = lesson.config
+    fallen = np.isfinite(walk_metrics.fall_times(walk, config.robot.leg)[0])
+    settled = walk.after(config.settle)
+    weight = GRAVITY * config.robot.mass
+    measured = {
+        "distance_m": walk_metrics.distances(settled)[0],
+        "speed_m_s": walk_metrics.speeds(settled)[0],
+        "cost_of_transport": walk_metrics.costs_of_transport(settled, weight)[0],
+        "duty_factors": (settled.contact[0] > 0).mean(axis=0),
+        "turn_deg_per_s": np.degrees(walk_metrics.turns(settled)[0]) / config.walking,
+    }
+    if fallen:
+        measured = dict.fromkeys(measured, None)
+    period = walk_metrics.stride_period(settled, lesson.period(name))
+    return {"falls": int(fallen), **measured, "stride_period_s": period}
+
+
+def states_at(lesson: Lesson, gait: LegReadout, waits: Array, coupling: float = 0.0) -> Array:
+    """States (len(waits), n) of a robot after `before` seconds and ascending waits [s] more."""
+    walker = lesson.walker(coupling=coupling)
+    walker.start(gait)
+    states, done = [], 0
+    for wait in waits:
+        until = round((lesson.config.before + wait) / walker.timestep)
+        walker.advance(until - done)
+        done = until
+        states.append(walker.snapshot()[0])
+    return np.array(states)

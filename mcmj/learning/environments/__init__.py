@@ -1,0 +1,1 @@
+"""Bodies as environments of dm_control and Gymnasium."""

@@ -1,0 +1,101 @@
+"""Long free runs in closed loop: flat memory, checkpoints, errors in windows."""
+
+import numpy as np
+
+from mcmj.learning.regression import Fit
+from mcmj.metrics import orbits
+from mcmj.simulation.simulation import Simulation
+from mcmj.targets.limit_cycles import Target
+from mcmj.utils.checkpoint import Checkpoint
+from mcmj.utils.progress import OnSteps
+from mcmj.utils.validation import Array, require_number
+
+WINDOW = 50.0  # s
+
+
+def resume(simulation: Simulation, checkpoint: Checkpoint) -> tuple[Array, Fit | None] | None:
+    """Bring a simulation to where its checkpoint stands, if there is one.
+
+    Returns:
+        The outputs so far (T, n_outputs), and the fit if the readout was taught.
+    """
+    saved = checkpoint.load()
+    if saved is None:
+        return None
+    arrays, outputs = saved
+    simulation.set_readout(arrays["w_out"])
+    simulation.restore(arrays["snapshot"])
+    fit = arrays.get("fit")
+    if fit is None:
+        return outputs, None
+    nrmse, rank, condition, rows = (float(value) for value in fit)
+    return outputs, Fit(arrays["w_out"], nrmse, int(rank), condition, int(rows))
+
+
+def free_run(
+    simulation: Simulation,
+    steps: int,
+    *,
+    done: Array | None = None,
+    checkpoint: Checkpoint | None = None,
+    fit: Fit | None = None,
+    on_steps: OnSteps = lambda steps: None,
+) -> Array:
+    """Run free and keep only the outputs (steps, n_outputs); a checkpoint after every chunk.
+
+    Args:
+        done: outputs of the steps that are done already; the chunks are the same either way.
+        fit: kept in the checkpoint.
+    """
+    outputs = np.empty((steps, simulation.body.n_outputs))
+    at = 0 if done is None else len(done)
+    if done is not None:
+        outputs[:at] = done
+    if at == steps:
+        return outputs
+    for part in simulation.stream(steps - at, record=("outputs",)):
+        new = part.get("outputs")
+        outputs[at : at + len(new)] = new
+        if checkpoint is not None:
+            checkpoint.save(_state(simulation, fit), new, at)
+        at += len(new)
+        on_steps(len(new))
+    return outputs
+
+
+def _state(simulation: Simulation, fit: Fit | None) -> dict[str, Array]:
+    w_out = simulation.w_out
+    assert w_out is not None
+    arrays = {"snapshot": simulation.snapshot(), "w_out": w_out}
+    if fit is not None:
+        numbers = [fit.train_nrmse, fit.rank, fit.condition_number, fit.rows]
+        arrays["fit"] = np.array(numbers, dtype=np.float64)
+    return arrays
+
+
+def window_errors(
+    outputs: Array, timestep: float, target: Target, *, length: float = WINDOW
+) -> dict[str, object]:
+    """Orbit and period errors of consecutive whole windows of a free run, and their drift.
+
+    Returns:
+        length [s]; orbit_errors and periods [s] of the windows (NaN: no rhythm);
+        orbit_error_ratio, the last window's over the second's; period_drift,
+        (T_last - T_second) / T*, both None with fewer than three windows; none of this if
+        there is no whole window.
+    """
+    require_number("length", length, orbits.PERIODS_NEEDED * target.period)
+    rows = round(length / timestep)
+    windows = [outputs[k : k + rows] for k in range(0, len(outputs) - rows + 1, rows)]
+    if not windows:
+        return {}
+    errors = [orbits.orbit_error(window, target) for window in windows]
+    periods = [orbits.period_or_nan(window, timestep, target) for window in windows]
+    enough = len(windows) > 2
+    return {
+        "length": length,
+        "orbit_errors": errors,
+        "periods": periods,
+        "orbit_error_ratio": errors[-1] / errors[1] if enough else None,
+        "period_drift": (periods[-1] - periods[1]) / target.period if enough else None,
+    }

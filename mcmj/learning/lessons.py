@@ -1,0 +1,111 @@
+"""What is to be taught, and how: lessons of teacher forcing; mcmj.teaching gives them."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from mcmj.simulation.simulation import Simulation
+from mcmj.utils.errors import InvalidArgumentError
+from mcmj.utils.validation import Array, require_count, require_duration, require_number
+
+Signal = Callable[[Array], Array]  # times (T,) [s] -> (T, n)
+
+
+@dataclass(frozen=True)
+class Teaching:
+    """How a readout is taught.
+
+    Attributes:
+        duration: teacher forcing, washout included [s].
+        washout: start of it that the regression leaves out [s].
+        noise: standard deviation of the white noise on the fed-back teacher signal (units of
+            the output); the regression target stays clean. Without it the free run drifts off.
+        length_noise: standard deviation of white noise on the lengths the readout sees [m].
+        ridge_per_row: ridge parameter over the number of rows (the sum of their weights); s^2
+            does what a length noise of s would, without randomness.
+        bias: fit a constant too (the paper's readout has none).
+        every: the regression takes every n-th step only: neighbours at 1 ms are nearly equal.
+        rest_runs: number of runs taught from total rest, without washout, beside the one
+            above; they teach the body to swing up.
+        rest_duration: of each of them [s]; the target starts at time 0 at full size.
+        rest_weight: of their squared errors, against 1. Small, for a linear readout cannot
+            serve both well.
+    """
+
+    duration: float = 120.0
+    washout: float = 20.0
+    noise: float = 0.2
+    length_noise: float = 0.0
+    ridge_per_row: float = 0.0
+    bias: bool = False
+    every: int = 1
+    rest_runs: int = 0
+    rest_duration: float = 12.0
+    rest_weight: float = 1e-3
+
+    def __post_init__(self) -> None:
+        require_duration("duration", self.duration)
+        require_washout(self.washout, self.duration)
+        for name in ("noise", "length_noise", "ridge_per_row"):
+            require_number(name, getattr(self, name), 0.0)
+        require_count("every", self.every, 1, 1000)
+        require_count("rest_runs", self.rest_runs, 0)
+        require_duration("rest_duration", self.rest_duration)
+        require_number("rest_weight", self.rest_weight, 0.0, open_low=True)
+
+    @property
+    def total(self) -> float:
+        """Of all runs together [s]."""
+        return self.duration + self.rest_runs * self.rest_duration
+
+
+def require_washout(washout: float, duration: float) -> None:
+    """Raise unless 0 <= washout < duration [s]."""
+    require_number("washout", washout, 0.0)
+    if washout >= duration:
+        raise InvalidArgumentError("washout", f"less than the duration of {duration:g} s", washout)
+
+
+@dataclass(frozen=True)
+class Lesson:
+    """A stretch of teacher forcing: what is fed back, and what the readout is to say then.
+
+    Signals are functions of the simulation's time, which is 0 where a lesson starts from rest.
+
+    Attributes:
+        outputs: times (T,) [s] -> (T, n_outputs).
+        duration: washout included [s].
+        washout: start of it that the regression leaves out [s].
+        inputs: times (T,) [s] -> (T, n_inputs); None: no input.
+        weight: of the squared errors, a number or times (T,) [s] -> (T,).
+        from_rest: begin at total rest and time 0, and leave the simulation as it was.
+        start: begin at this snapshot of the simulation, and leave it as it was.
+        own_share: s in [0, 1]: s y + (1 - s) y* + noise is fed back, y the body's own outputs.
+    """
+
+    outputs: Signal
+    duration: float
+    washout: float = 0.0
+    inputs: Signal | None = None
+    weight: float | Signal = 1.0
+    from_rest: bool = False
+    start: Array | None = None
+    own_share: float = 0.0
+
+    def __post_init__(self) -> None:
+        require_number("duration", self.duration, 0.0, open_low=True)
+        require_washout(self.washout, self.duration)
+        require_number("own_share", self.own_share, 0.0, 1.0)
+        if self.from_rest and self.start is not None:
+            raise InvalidArgumentError("start", "None for a lesson from rest", "a snapshot")
+
+    @property
+    def elsewhere(self) -> bool:
+        """Whether it begins where the simulation is not."""
+        return self.from_rest or self.start is not None
+
+    def begin(self, simulation: Simulation) -> None:
+        """Put a simulation where the lesson begins."""
+        if self.from_rest:
+            simulation.reset()
+        if self.start is not None:
+            simulation.restore(self.start)

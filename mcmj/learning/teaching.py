@@ -1,0 +1,175 @@
+"""Teacher forcing: the target is fed back in place of the outputs, and the readout is fitted."""
+
+from collections.abc import Iterable
+from copy import copy
+
+import numpy as np
+
+from mcmj.learning.lessons import Lesson, Teaching
+from mcmj.learning.regression import Fit, Regression
+from mcmj.simulation.simulation import CHUNK, Simulation
+from mcmj.targets.limit_cycles import Target
+from mcmj.utils.errors import InvalidArgumentError
+from mcmj.utils.progress import OnSteps
+from mcmj.utils.seeds import stream
+from mcmj.utils.validation import Array
+
+
+def teach(
+    simulation: Simulation,
+    target: Target,
+    teaching: Teaching,
+    seed: int,
+    *,
+    on_steps: OnSteps = lambda steps: None,
+) -> Fit:
+    """Teach a target to a body by teacher forcing, then close the loop with the readout.
+
+    The teacher runs on from the simulation's time, so that afterwards the target's value at
+    `simulation.time` is still what the body should do. Memory does not grow with duration.
+
+    Args:
+        simulation: the body to teach; afterwards its readout is the fitted one.
+        seed: of the noise streams.
+        on_steps: called with the number of steps done after every chunk, for progress bars.
+
+    Raises:
+        DivergenceError: the body blew up under the teacher.
+    """
+    return teach_lessons(
+        simulation, lessons_of(target, teaching), teaching, seed, on_steps=on_steps
+    )
+
+
+def teach_lessons(
+    simulation: Simulation,
+    lessons: Iterable[Lesson],
+    teaching: Teaching,
+    seed: int,
+    *,
+    on_steps: OnSteps = lambda steps: None,
+) -> Fit:
+    """One readout fitted to several lessons together; the simulation then runs it.
+
+    Args:
+        teaching: noise, ridge and bias; durations are the lessons' own.
+        seed, on_steps: as for `teach`.
+
+    Raises:
+        DivergenceError: the body blew up under the teacher.
+    """
+    course = Course(simulation, teaching, seed)
+    course.attend_all(lessons, on_steps=on_steps)
+    return course.fit()
+
+
+def lessons_of(target: Target, teaching: Teaching) -> list[Lesson]:
+    """What `teaching` asks for: the runs from rest, then the one on the cycle."""
+    from_rest = Lesson(
+        target.sample, teaching.rest_duration, weight=teaching.rest_weight, from_rest=True
+    )
+    on_cycle = Lesson(target.sample, teaching.duration, teaching.washout)
+    return [*[from_rest] * teaching.rest_runs, on_cycle]
+
+
+class Course:
+    """A body being taught: lessons are folded in one by one, a readout fitted at any time.
+
+    Args:
+        simulation: the body; its state carries over from lesson to lesson.
+        teaching: noise, ridge and bias; durations are the lessons' own.
+        seed: of the noise streams.
+    """
+
+    def __init__(self, simulation: Simulation, teaching: Teaching, seed: int) -> None:
+        self.simulation, self._teaching = simulation, teaching
+        self._regression = Regression(bias=teaching.bias)
+        self._noise = stream(seed, "teacher_noise")
+        self._rest_noise = stream(seed, "rest_noise")
+        self._length_noise = stream(seed, "length_noise")
+
+    @property
+    def regression(self) -> Regression:
+        """Of all lessons so far: it serves any ridge."""
+        return self._regression
+
+    def fit(self) -> Fit:
+        """The readout that serves all lessons so far best; the simulation runs it from now on."""
+        ridge = self._teaching.ridge_per_row * self._regression.weight
+        fit = self._regression.solve(ridge=ridge)
+        self.simulation.set_readout(fit.w_out)
+        return fit
+
+    def attend_all(
+        self, lessons: Iterable[Lesson], *, on_steps: OnSteps = lambda steps: None
+    ) -> None:
+        """One lesson after the other; see `attend`."""
+        for lesson in lessons:
+            self.attend(lesson, on_steps=on_steps)
+
+    def attend(self, lesson: Lesson, *, on_steps: OnSteps = lambda steps: None) -> None:
+        """Run a lesson and fold it in; memory does not grow with its duration.
+
+        Raises:
+            DivergenceError: the body blew up; nothing of the lesson is then folded in.
+            InvalidArgumentError: a share of its own outputs for a body that has no readout.
+        """
+        if lesson.own_share > 0 and self.simulation.w_out is None:
+            raise InvalidArgumentError("own_share", "0 before the first fit", lesson.own_share)
+        before = self.simulation.snapshot()
+        lesson.begin(self.simulation)
+        learnt = copy(self._regression)
+        try:
+            self._follow(lesson, learnt, on_steps)
+        finally:
+            if lesson.elsewhere:
+                self.simulation.restore(before)
+        self._regression = learnt
+
+    def _follow(self, lesson: Lesson, regression: Regression, on_steps: OnSteps) -> None:
+        step = self.simulation.timestep
+        total, washout = round(lesson.duration / step), round(lesson.washout / step)
+        first = round(self.simulation.time / step)
+        for start in range(0, total, CHUNK):
+            steps = np.arange(start, min(start + CHUNK, total))
+            times = step * (first + steps).astype(np.float64)
+            clean = lesson.outputs(times)
+            lengths = self._lengths(lesson, times, clean)
+            learned = (steps >= washout) & (steps % self._teaching.every == 0)
+            if learned.any():
+                weight = lesson.weight
+                weights = weight(times[learned]) if callable(weight) else weight
+                regression.add(lengths[learned], clean[learned], weight=weights)
+            on_steps(len(steps))
+
+    def _lengths(self, lesson: Lesson, times: Array, clean: Array) -> Array:
+        """Lengths (T, L) under the teacher, as the readout sees them."""
+        noise = self._rest_noise if lesson.elsewhere else self._noise
+        noisy = (1.0 - lesson.own_share) * clean
+        noisy += self._teaching.noise * noise.standard_normal(clean.shape)
+        run = self.simulation.rollout(
+            inputs=None if lesson.inputs is None else lesson.inputs(times),
+            offset=noisy,
+            gate=lesson.own_share,
+            record=("lengths",),
+        )
+        lengths = run.get("lengths")
+        if self._teaching.length_noise > 0:
+            seen = self._length_noise.standard_normal(lengths.shape)
+            lengths = lengths + self._teaching.length_noise * seen
+        return lengths
+
+
+def synchronise(
+    simulation: Simulation, target: Target, duration: float, inputs: object = None
+) -> None:
+    """Bring a body onto the target by clean teacher forcing, without learning.
+
+    Args:
+        duration: [s].
+        inputs: (n_inputs,) held meanwhile; default: 0.
+    """
+    step = simulation.timestep
+    steps = round(simulation.time / step) + np.arange(round(duration / step))
+    held = None if inputs is None else np.tile(np.asarray(inputs, np.float64), (len(steps), 1))
+    simulation.rollout(inputs=held, offset=target.sample(steps * step), gate=0.0, record=())

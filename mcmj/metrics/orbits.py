@@ -1,0 +1,223 @@
+"""Errors of generated outputs; each name says its definition."""
+
+import numpy as np
+import numpy.typing as npt
+from scipy.spatial import cKDTree
+
+from mcmj.targets.limit_cycles import Target
+from mcmj.utils.errors import InvalidArgumentError
+from mcmj.utils.validation import Array, as_array, require_number
+
+PERIODS_NEEDED = 1.5  # to measure a period
+REPEATS = 0.05  # relative mismatch below which outputs count as repeating
+ORBIT_POINTS = 4096  # of a target's polygon: chords are off by about 1e-6 of its size
+
+
+def rms_radius(orbit: Array) -> float:
+    """Root mean square distance of an orbit (P, n) from its mean."""
+    return float(np.sqrt(((orbit - orbit.mean(axis=0)) ** 2).sum(axis=1).mean()))
+
+
+def orbit_error(outputs: Array, target: Target) -> float:
+    """Distance between the generated and the target orbit in the phase plane, no phase.
+
+    The larger of two RMS distances, over the target's RMS radius: from every output to the
+    nearest point of the target orbit (is everything generated on the orbit?), and from every
+    point of the target orbit to the nearest output (is all of the orbit covered?).
+
+    Args:
+        outputs: (T, n_outputs), at least one period long.
+
+    Raises:
+        InvalidArgumentError: wrong shape, or NaN.
+    """
+    generated = as_array("outputs", outputs, (None, target.n_outputs))
+    wanted = target.orbit(ORBIT_POINTS)
+    there = _distances_to_curve(generated, wanted, closed=True)
+    back = _distances_to_curve(wanted, generated, closed=False)
+    return max(_rms(there), _rms(back)) / rms_radius(wanted)
+
+
+def orbit_distances(outputs: Array, target: Target) -> Array:
+    """Distances (T,) of outputs (T, n_outputs) to the target orbit, over its RMS radius."""
+    generated = as_array("outputs", outputs, (None, target.n_outputs))
+    wanted = target.orbit(ORBIT_POINTS)
+    return _distances_to_curve(generated, wanted, closed=True) / rms_radius(wanted)
+
+
+def recovery_time(
+    outputs: Array, timestep: float, target: Target, *, tolerance: float = 0.05
+) -> float:
+    """Time [s] from which on the outputs (T, n_outputs) stay within the tolerance of the orbit.
+
+    Infinite unless they do so for a whole period at the end: the last output further from the
+    target orbit than tolerance x its RMS radius must come a period before the end.
+    """
+    require_number("tolerance", tolerance, 0.0, open_low=True)
+    outside = np.flatnonzero(orbit_distances(outputs, target) > tolerance)
+    time = (int(outside[-1]) + 1) * timestep if outside.size else 0.0
+    return time if time <= len(outputs) * timestep - target.period else np.inf
+
+
+def period(outputs: Array, timestep: float, guess: float) -> float:
+    """Mean period [s] of outputs (T, n): the lag at which they repeat, over many periods.
+
+    First the smallest lag from 0.2 to 3 times the guess at which the outputs repeat: a minimum
+    of their mean squared difference from their lagged copy, over twice their variance, below
+    0.05 and as deep as the deepest. Then as many whole periods as fit into half of the samples,
+    to a fraction of a sample.
+
+    Args:
+        guess: expected period [s].
+
+    Returns:
+        The period, or NaN if the outputs do not repeat at any of these lags.
+
+    Raises:
+        InvalidArgumentError: outputs at rest, or shorter than 1.5 periods of the guess.
+    """
+    require_number("timestep", timestep, 0.0, open_low=True)
+    require_number("guess", guess, 0.0, open_low=True)
+    values = as_array("outputs", outputs, (None, None))
+    if _at_rest(values):
+        raise InvalidArgumentError("outputs", "something that moves", "outputs at rest")
+    if len(values) * timestep < PERIODS_NEEDED * guess:
+        raise InvalidArgumentError(
+            "outputs",
+            f"at least {PERIODS_NEEDED} periods of {guess:g} s",
+            f"{len(values) * timestep:g} s",
+        )
+    coarse, spacing = _first_repeat(values, guess / timestep)
+    if np.isnan(coarse):
+        return np.nan
+    estimate = _best_lag(values, coarse, max(3.0, 2.0 * spacing))
+    cycles = 1
+    while 2 * (cycles + 1) * estimate < len(values):
+        cycles += 1
+        lag = _best_lag(values, cycles * estimate, max(3.0, 0.02 * estimate))
+        estimate = lag / cycles
+    return float(estimate * timestep)
+
+
+def period_or_nan(outputs: Array, timestep: float, target: Target) -> float:
+    """Mean period [s] of outputs near a target's; NaN if they rest or do not repeat."""
+    values = as_array("outputs", outputs, (None, target.n_outputs))
+    return np.nan if _at_rest(values) else period(values, timestep, target.period)
+
+
+def relative_period_error(outputs: Array, timestep: float, target: Target) -> float:
+    """|T - T*| / T*, T the outputs' mean period and T* the target's; infinite without a period."""
+    found = period_or_nan(outputs, timestep, target)
+    return np.inf if np.isnan(found) else abs(found / target.period - 1.0)
+
+
+def relative_amplitude_error(outputs: Array, target: Target) -> float:
+    """Largest over the outputs of |A - A*| / A*, A the range (max - min) of an output."""
+    values = as_array("outputs", outputs, (None, target.n_outputs))
+    wanted = np.ptp(target.orbit(ORBIT_POINTS), axis=0)
+    return float(np.abs(np.ptp(values, axis=0) / wanted - 1.0).max())
+
+
+def nrmse_std(outputs: Array, targets: Array) -> float:
+    """sqrt(mean (y - y*)^2) / std(y*), all outputs together; 1 for the targets' mean.
+
+    Args:
+        outputs, targets: (T, n_outputs); std is that of the targets about their means.
+
+    Raises:
+        InvalidArgumentError: shapes that differ, NaN, or targets that never change.
+    """
+    return float(np.sqrt(nmse_var(outputs, targets)))
+
+
+def nrmse_range(outputs: Array, targets: Array) -> float:
+    """sqrt(mean (y - y*)^2 / (max y* - min y*)^2), the mean over samples and outputs.
+
+    Args, Raises: as for `nrmse_std`.
+    """
+    found, wanted = _pair(outputs, targets)
+    return _rms((found - wanted) / np.ptp(wanted, axis=0))
+
+
+def nmse_var(outputs: Array, targets: Array) -> float:
+    """mean (y - y*)^2 / var(y*), all outputs together: the square of `nrmse_std`.
+
+    Args, Raises: as for `nrmse_std`.
+    """
+    found, wanted = _pair(outputs, targets)
+    return float(((found - wanted) ** 2).sum() / ((wanted - wanted.mean(axis=0)) ** 2).sum())
+
+
+def _pair(outputs: Array, targets: Array) -> tuple[Array, Array]:
+    wanted = as_array("targets", targets, (None, None))
+    found = as_array("outputs", outputs, wanted.shape)
+    still = np.flatnonzero(np.ptp(wanted, axis=0) == 0.0)
+    if still.size:
+        raise InvalidArgumentError("targets", "columns that change", f"column {still[0]} constant")
+    return found, wanted
+
+
+def _at_rest(values: Array) -> bool:
+    return bool((np.ptp(values, axis=0) <= 1e-9 * (1.0 + np.abs(values).max())).all())
+
+
+def _rms(distances: Array) -> float:
+    return float(np.sqrt((distances**2).mean()))
+
+
+def _distances_to_curve(points: Array, curve: Array, *, closed: bool) -> Array:
+    """Distances (P,) to a polygon: to the segments on both sides of the nearest vertex."""
+    _, nearest = cKDTree(curve).query(points)
+    last = len(curve) - 1
+    before = nearest - 1 if closed else np.maximum(nearest - 1, 0)
+    after = np.where(nearest == last, 0 if closed else last, nearest + 1)
+    vertex = curve[nearest]
+    sides = [_to_segment(points, vertex, curve[other]) for other in (before, after)]
+    return np.minimum(*sides)
+
+
+def _to_segment(points: Array, start: Array, end: Array) -> Array:
+    along = end - start
+    squared = (along**2).sum(axis=1)
+    fraction = ((points - start) * along).sum(axis=1) / np.where(squared > 0, squared, 1.0)
+    foot = start + np.clip(fraction, 0.0, 1.0)[:, None] * along
+    return np.linalg.norm(points - foot, axis=1)
+
+
+def _first_repeat(values: Array, guess: float) -> tuple[float, int]:
+    """Smallest lag [samples] at which values repeat (NaN: none), and the spacing searched."""
+    highest = min(3.0 * guess, 0.8 * len(values))
+    spacing = max(1, int(guess / 400))
+    sparse = values[::spacing] - values.mean(axis=0)
+    lags = np.arange(max(1, int(0.2 * guess / spacing)), int(highest / spacing))
+    costs = np.array([_difference(sparse, int(lag)) for lag in lags])
+    inside = np.flatnonzero((costs[1:-1] <= costs[:-2]) & (costs[1:-1] <= costs[2:])) + 1
+    deep = inside[costs[inside] < min(REPEATS, costs[inside].min(initial=REPEATS) + 0.01)]
+    return (float(lags[deep[0]] * spacing) if deep.size else np.nan), spacing
+
+
+def _difference(values: Array, lag: int) -> float:
+    """Mean squared difference from the lagged copy, over twice the overlap's variance."""
+    head, tail = values[:-lag], values[lag:]
+    power = (head**2).sum() + (tail**2).sum()
+    return float(((head - tail) ** 2).sum() / power) if power > 0 else 1.0
+
+
+def _best_lag(values: Array, centre: float, reach: float) -> float:
+    """Lag, in samples and fractions, near `centre` at which values repeat best."""
+    low = max(1, int(np.floor(centre - reach)))
+    high = min(len(values) - 2, int(np.ceil(centre + reach)))
+    lags = np.arange(low, high + 1)
+    costs = _mismatch(values, lags.astype(np.int64))
+    best = int(np.clip(costs.argmin(), 1, len(lags) - 2))
+    left, middle, right = costs[best - 1 : best + 2]
+    bend = left - 2 * middle + right
+    shift = 0.5 * (left - right) / bend if bend > 0 else 0.0
+    return float(lags[best] + np.clip(shift, -1.0, 1.0))
+
+
+def _mismatch(values: Array, lags: npt.NDArray[np.int64]) -> Array:
+    """Mean squared difference between values and their lagged copies, same window for all."""
+    window = len(values) - int(lags[-1])
+    head = values[:window]
+    return np.array([((values[lag : lag + window] - head) ** 2).mean() for lag in lags])

@@ -1,0 +1,94 @@
+"""How a body looks in MuJoCo: the colours of the paper's Figs. 2 and 5m, camera, headlight."""
+
+import xml.etree.ElementTree as ET
+
+import numpy as np
+import numpy.typing as npt
+
+from mcmj.core.body import Body
+
+FIXED_COLOUR = (0.85, 0.10, 0.10)
+INPUT_COLOUR = (0.20, 0.70, 0.20)
+FEEDBACK_COLOURS = ((0.55, 0.20, 0.70), (0.10, 0.70, 0.75), (0.95, 0.60, 0.10), (0.90, 0.40, 0.65))
+PLAIN_COLOUR = (0.45, 0.45, 0.45)
+SPRING_COLOUR = (0.55, 0.58, 0.62)
+STRETCHED_COLOUR = (0.84, 0.15, 0.16)
+SHORTENED_COLOUR = (0.12, 0.31, 0.84)
+ARROW_COLOUR = (0.10, 0.10, 0.10)
+CAMERA_ANGLE = 30.0  # degrees; narrow: nodes far out are seen from above too
+NODE_SHARE, SPRING_SHARE = 0.014, 0.003  # radii, of the view
+MARGIN = 0.12  # of the body's larger side, around it
+
+
+def node_colour(body: Body, node: int) -> tuple[float, float, float]:
+    """Colour of a node by its role: fixed, input, fed back by output c, or none."""
+    if body.fixed[node]:
+        return FIXED_COLOUR
+    fed = np.flatnonzero(body.w_fb[node])
+    if fed.size:
+        return FEEDBACK_COLOURS[fed[0] % len(FEEDBACK_COLOURS)]
+    return INPUT_COLOUR if body.w_in[node].any() else PLAIN_COLOUR
+
+
+def node_kinds(body: Body) -> dict[str, tuple[float, float, float]]:
+    """Names and colours of the roles that a body's nodes have, for a legend."""
+    kinds = {"fixed": FIXED_COLOUR}
+    if body.n_inputs:
+        kinds["input"] = INPUT_COLOUR
+    for c in range(body.n_outputs):
+        kinds[f"fed x{c + 1}"] = FEEDBACK_COLOURS[c % len(FEEDBACK_COLOURS)]
+    kinds["free"] = PLAIN_COLOUR
+    used = {node_colour(body, node) for node in range(body.n_nodes)}
+    return {name: colour for name, colour in kinds.items() if colour in used}
+
+
+def frame(body: Body) -> tuple[float, float, float, float]:
+    """Centre x, centre y, width and height [m] of the view that shows the whole body."""
+    low, high = body.positions.min(axis=0), body.positions.max(axis=0)
+    margin = MARGIN * (high - low).max()
+    (cx, cy), (width, height) = (low + high) / 2, high - low + 2 * margin
+    return float(cx), float(cy), float(width), float(height)
+
+
+def node_style(body: Body, node: int) -> dict[str, str]:
+    """Attributes of a node's site."""
+    radius = NODE_SHARE * max(frame(body)[2:])
+    shape = "box" if body.fixed[node] else "sphere"
+    colour = " ".join(f"{c:g}" for c in node_colour(body, node))
+    return {"type": shape, "size": f"{radius:.6g} {radius:.6g} {radius:.6g}", "rgba": f"{colour} 1"}
+
+
+def add_appearance(root: ET.Element, body: Body) -> None:
+    """Add the view from above and the worldbody with its camera; shadows and smoothing off,
+    on white."""
+    cx, cy, width, height = frame(body)
+    extent = max(width, height)
+    distance = extent / 2 / np.tan(np.radians(CAMERA_ANGLE / 2))
+    ET.SubElement(root, "statistic", center=f"{cx:g} {cy:g} 0", extent=f"{extent:g}")
+    visual = ET.SubElement(root, "visual")
+    ET.SubElement(visual, "global", azimuth="90", elevation="-90", fovy=f"{CAMERA_ANGLE:g}")
+    ET.SubElement(visual, "headlight", ambient=".7 .7 .7", diffuse=".3 .3 .3", specular="0 0 0")
+    ET.SubElement(visual, "quality", shadowsize="0", offsamples="0", numslices="12", numstacks="6")
+    ET.SubElement(
+        ET.SubElement(root, "asset"),
+        "texture", type="skybox", builtin="flat", rgb1="1 1 1", rgb2="1 1 1",
+        width="4", height="24",
+    )  # fmt: skip
+    default = ET.SubElement(root, "default")
+    colour = " ".join(f"{c:g}" for c in SPRING_COLOUR)
+    ET.SubElement(default, "tendon", width=f"{SPRING_SHARE * extent:.6g}", rgba=f"{colour} 1")
+    world = ET.SubElement(root, "worldbody")
+    ET.SubElement(
+        world,
+        "camera",
+        name="top",
+        pos=f"{cx:.9g} {cy:.9g} {distance:.9g}",
+        fovy=f"{CAMERA_ANGLE:g}",
+    )
+
+
+def strain_colours(strain: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+    """Colours (..., L, 3) from strain (..., L) in [-1, 1]: blue if shortened, red if stretched."""
+    goal = np.where(strain[..., None] > 0, STRETCHED_COLOUR, SHORTENED_COLOUR)
+    weight = np.sqrt(np.abs(strain))[..., None]
+    return (1 - weight) * np.array(SPRING_COLOUR) + weight * goal

@@ -1,0 +1,121 @@
+"""Bodies of the authors' public Matlab toolbox, from .mat files (`save` of a `net` structure).
+
+What is read of the structure, N masses, L springs, indices from 1:
+
+    P.states (N, 4): x, y, dx/dt, dy/dt now      P.fixed (N, 1)
+    W.from, W.to, W.k1, W.k3, W.d1, W.d3, W.l0, W.dist_old (L, 1)
+    W_in (N, nInputs), W_fb (N, nOutputs)        horizontal force per unit
+    W_out (L, nOutputs), readout_type 'LENGTHS'
+    init_data.time_step, init_data.P.states      the step [s]; where the masses started
+    tansig, rk_steps                             if there: tanh-like springs; "rk" scheme
+
+(init_ms_sys_net.m and simulate_ms_sys.m of github.com/helmuthauser/
+Matlab_Morphological_Computation_Simulation.) Mass is 1 there. Not read: noise, `info`.
+"""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy.io import loadmat
+from scipy.io.matlab import MatReadError
+
+from mcmj.core.body import Body
+from mcmj.core.trajectory import State
+from mcmj.utils.errors import BodyFileError, InvalidArgumentError, UnknownNameError
+from mcmj.utils.validation import Array
+
+
+@dataclass(frozen=True)
+class ToolboxNet:
+    """A `net` of the toolbox.
+
+    Attributes:
+        body: geometry, springs and weights; its positions are where the masses started.
+        w_out: (L, n_outputs); None if the readout is one of positions.
+        timestep: [s].
+        method: "toolbox_euler" or "toolbox_rk", for mcmj.reference.integrate.
+        springs: "native", or "tansig" for Simulation(springs=..).
+        state: where the masses were when it was saved; `integrate` goes on from there.
+    """
+
+    body: Body
+    w_out: Array | None
+    timestep: float
+    method: str
+    springs: str
+    state: State
+
+
+def load_toolbox_net(path: str | Path, name: str | None = None) -> ToolboxNet:
+    """Read a body from a .mat file of versions 4 to 7.
+
+    Args:
+        name: of the variable; needed only if the file holds several nets.
+
+    Raises:
+        BodyFileError: no such file, not a .mat file, or no net in it.
+        UnknownNameError: no net of that name, or several and no name.
+    """
+    if not Path(path).is_file():
+        raise BodyFileError(f"no such .mat file: {path}")
+    try:
+        variables = loadmat(path, simplify_cells=True)
+    except NotImplementedError as error:
+        raise BodyFileError(f"{path}: HDF5 inside; in Matlab: save(.., 'net', '-v7')") from error
+    except (ValueError, OSError, TypeError, MatReadError) as error:
+        raise BodyFileError(f"{path}: not a .mat file ({error})") from error
+    nets = {key: value for key, value in variables.items() if _is_net(value)}
+    if not nets:
+        raise BodyFileError(f"{path}: no structure with the fields P and W of the toolbox")
+    if name is None and len(nets) == 1:
+        name = next(iter(nets))
+    if name not in nets:
+        raise UnknownNameError("net", name, nets)
+    try:
+        return _read(nets[name])
+    except (KeyError, IndexError, InvalidArgumentError) as error:
+        missing = f"no field {error}" if isinstance(error, KeyError) else str(error)
+        raise BodyFileError(f"{path}: {name} is not a net of the toolbox: {missing}") from error
+
+
+def _is_net(value: object) -> bool:
+    return isinstance(value, dict) and {"P", "W"} <= value.keys()
+
+
+def _read(net: dict[str, Any]) -> ToolboxNet:
+    points, springs, settings = net["P"], net["W"], net.get("init_data", {})
+    states = np.atleast_2d(points["states"]).astype(np.float64)
+    start = np.atleast_2d(settings["P"]["states"]) if "P" in settings else states
+    n_nodes, n_springs = len(states), np.size(springs["from"])
+    body = Body(
+        start[:, :2],
+        np.column_stack([np.ravel(springs["from"]), np.ravel(springs["to"])]) - 1,
+        **{name: np.ravel(springs[name]) for name in ("k1", "k3", "d1", "d3")},
+        rest_lengths=np.ravel(springs["l0"]),
+        fixed=np.ravel(points["fixed"]).astype(bool),
+        w_in=_matrix(net.get("W_in"), n_nodes),
+        w_fb=_matrix(net.get("W_fb"), n_nodes),
+    )
+    lengths = net.get("readout_type", "LENGTHS") == "LENGTHS" and "W_out" in net
+    state = State(
+        positions=np.ascontiguousarray(states[:, :2]),
+        velocities=np.ascontiguousarray(states[:, 2:4]),
+        previous_lengths=np.ravel(springs["dist_old"]).astype(np.float64),
+        pending_output=np.zeros(body.n_outputs),
+    )
+    return ToolboxNet(
+        body=body,
+        w_out=_matrix(net["W_out"], n_springs) if lengths else None,
+        timestep=float(settings.get("time_step", 1e-3)),
+        method="toolbox_rk" if "rk_steps" in net else "toolbox_euler",
+        springs="tansig" if "tansig" in net else "native",
+        state=state,
+    )
+
+
+def _matrix(value: object, rows: int) -> Array:
+    """(rows, columns): Matlab's files lose the second axis of a column, and empty columns."""
+    array = np.asarray(0.0 if value is None else value, dtype=np.float64)
+    return array.reshape(rows, -1) if array.size and array.ndim else np.zeros((rows, 0))

@@ -1,0 +1,1 @@
+"""Figures and films: what is shared by all experiments. Nothing here simulates or teaches."""

@@ -1,0 +1,190 @@
+"""Figures in the manner of the paper's. Takes results, never simulates."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.collections import LineCollection
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from mcmj.core.body import Body
+from mcmj.metrics.orbits import ORBIT_POINTS
+from mcmj.mjcf.appearance import (
+    FEEDBACK_COLOURS,
+    FIXED_COLOUR,
+    INPUT_COLOUR,
+    PLAIN_COLOUR,
+    node_colour,
+)
+from mcmj.targets.limit_cycles import Target
+from mcmj.utils.files import whole_file
+from mcmj.utils.validation import Array
+
+TARGET_COLOUR = "#d62728"  # the paper's red
+OUTPUT_STYLES: tuple[dict[str, Any], ...] = (
+    {"color": "black", "ls": "-"},
+    {"color": "#1f4fd6", "ls": "--"},
+)
+TASK_COLOURS = ("#1f4fd6", "black", "#2a9d3a")
+TITLES = {
+    "van_der_pol": "Van der Pol",
+    "quadratic": "Quadratic limit cycle",
+    "lissajous": "Lissajous 3:2",
+}
+
+
+def new_figure(width: float, height: float) -> Figure:
+    """An empty figure [inches] that needs no display and no global state."""
+    figure = Figure(figsize=(width, height), layout="constrained")
+    FigureCanvasAgg(figure)
+    return figure
+
+
+def save(figure: Figure, path: str | Path) -> None:
+    """Write a figure as PNG, whole or not at all."""
+    with whole_file(path) as temporary:
+        figure.savefig(temporary, dpi=130, format="png")
+
+
+def draw_body(axes: Axes, body: Body) -> None:
+    """The network: springs, and nodes in the colours of their roles, with a legend."""
+    lines = body.positions[body.springs]
+    axes.add_collection(LineCollection(list(lines), colors="0.6", linewidths=1.0))
+    for node, (x, y) in enumerate(body.positions):
+        marker = "s" if body.fixed[node] else "o"
+        axes.plot(x, y, marker, color=node_colour(body, node), ms=7, mec="black", mew=0.5)
+    roles = [("fixed", FIXED_COLOUR, "s"), ("input", INPUT_COLOUR, "o")][
+        : 2 if body.n_inputs else 1
+    ]
+    roles += [
+        (f"fed $x_{c + 1}$", FEEDBACK_COLOURS[c % len(FEEDBACK_COLOURS)], "o")
+        for c in range(body.n_outputs)
+    ]
+    handles = [
+        Line2D([], [], ls="", marker=marker, color=colour, mec="black", mew=0.5, label=label)
+        for label, colour, marker in [*roles, ("other", PLAIN_COLOUR, "o")]
+    ]
+    axes.legend(
+        handles=handles, loc="upper center", bbox_to_anchor=(0.5, -0.14), ncols=3, frameon=False
+    )
+    axes.set(aspect="equal", xlabel="x [m]", ylabel="y [m]")
+    axes.set_title(f"The body: {body.n_nodes} nodes, {body.n_springs} springs")
+    axes.margins(0.06)
+
+
+def draw_outputs(axes: Axes, times: Array, outputs: Array, wanted: Array) -> None:
+    """Outputs (T, n) over time on their targets; times [s]."""
+    for c in range(outputs.shape[1]):
+        axes.plot(times, wanted[:, c], color=TARGET_COLOUR, lw=3.0, alpha=0.55)
+        axes.plot(times, outputs[:, c], lw=1.3, **OUTPUT_STYLES[c % 2], label=f"$x_{c + 1}$")
+    axes.set(xlabel="time in closed loop [s]", xlim=(times[0], times[-1]))
+
+
+def draw_phase_plane(axes: Axes, outputs: Array, target: Target) -> None:
+    """The generated orbit (first two outputs) on the target's."""
+    orbit = target.orbit(ORBIT_POINTS)
+    closed = np.vstack([orbit, orbit[:1]])
+    axes.plot(closed[:, 0], closed[:, 1], color=TARGET_COLOUR, lw=3.5, alpha=0.55)
+    axes.plot(outputs[:, 0], outputs[:, 1], color="black", lw=0.8)
+    axes.set(aspect="equal", xlabel="$x_1$", ylabel="$x_2$")
+    axes.margins(0.12)
+    axes.locator_params(axis="x", nbins=4)
+
+
+def limit_cycle_figure(
+    body: Body,
+    runs: Sequence[tuple[Target, Array, Array, dict[str, float]]],
+    *,
+    free_run: float,
+    window: float,
+) -> Figure:
+    """Fig. 5: for each task the first and the last part of the free run, its phase plane; the body.
+
+    Args:
+        runs: per task: target, times (T,) [s], outputs (T, n) of the free run, errors by name.
+        free_run, window: lengths of the run and of the part that the errors are of [s].
+    """
+    figure = new_figure(15.5, 3.3 * len(runs) + 0.9)
+    grid = figure.add_gridspec(len(runs), 4, width_ratios=[1.6, 1.6, 1.0, 1.35])
+    for row, (target, times, outputs, errors) in enumerate(runs):
+        start, step = times[0], times[1] - times[0]
+        shown = min(round(window / step), len(times))
+        first, last, plane = (figure.add_subplot(grid[row, column]) for column in range(3))
+        wanted = target.sample(times[:shown])
+        draw_outputs(first, times[:shown] - start, outputs[:shown], wanted)
+        end = outputs[-shown:]
+        shift = best_phase(end, target, times[-shown:])
+        draw_outputs(last, times[-shown:] - start, end, target.sample(times[-shown:] + shift))
+        draw_phase_plane(plane, end, target)
+        first.set_title(f"{TITLES.get(target.name, target.name)}: loop closed at 0 s")
+        last.set_title(f"last {window:g} s of {free_run:g} s (target moved by {shift:+.2f} s)")
+        plane.set_title(
+            f"orbit error {100 * errors['orbit_error']:.2f} %\n"
+            f"period error {100 * errors['period_error']:.3f} %"
+        )
+        if row == 0:
+            handles = [
+                Line2D([], [], color=TARGET_COLOUR, lw=3, alpha=0.55, label="target"),
+                *(
+                    Line2D([], [], **OUTPUT_STYLES[c % 2], label=f"output $x_{c + 1}$")
+                    for c in range(outputs.shape[1])
+                ),
+            ]
+            figure.legend(handles=handles, loc="outside upper center", ncols=3, frameon=False)
+    draw_body(figure.add_subplot(grid[:, 3]), body)
+    return figure
+
+
+def success_figure(orbit_errors: dict[str, Array], threshold: float) -> Figure:
+    """Orbit errors of many bodies, sorted, one curve a task; failures stand above the line."""
+    figure = new_figure(7.5, 4.2)
+    axes = figure.add_subplot()
+    top = 2.0  # everything worse, blow-ups too, is drawn here
+    for (name, errors), colour in zip(orbit_errors.items(), TASK_COLOURS, strict=False):
+        good = int((errors < threshold).sum())
+        axes.semilogy(
+            np.arange(1, len(errors) + 1), np.sort(np.minimum(errors, top)), ".-", ms=4, lw=0.8,
+            color=colour, label=f"{TITLES.get(name, name)}: {good} of {len(errors)}",
+        )  # fmt: skip
+    axes.axhline(threshold, color=TARGET_COLOUR, ls="--", lw=1)
+    axes.annotate(
+        f"success below {100 * threshold:g} %", (1, threshold * 1.08), color=TARGET_COLOUR
+    )
+    axes.set(xlabel="body, sorted by error (each task for itself)", ylabel="orbit error")
+    axes.legend(frameon=False)
+    axes.grid(alpha=0.3)
+    return figure
+
+
+def growth_figure(rows: Sequence[dict[str, float]]) -> Figure:
+    """Cost of a step and of compiling against the number of springs."""
+    figure = new_figure(9.0, 3.8)
+    left, right = figure.subplots(1, 2)
+    springs = [row["springs"] for row in rows]
+    for engine, colour in (("mujoco", "black"), ("twin", "#1f4fd6")):
+        costs = [row[f"{engine}_ns_per_spring_step"] for row in rows]
+        left.loglog(springs, costs, "o-", color=colour, label=engine)
+    left.set(xlabel="springs", ylabel="cost [ns per spring and step]")
+    left.legend(frameon=False)
+    left.set_title("flat = linear in the size of the body")
+    right.loglog(springs, [row["compile_seconds"] for row in rows], "o-", color="black")
+    right.set(xlabel="springs", ylabel="time to build a Simulation [s]")
+    for axes in (left, right):
+        axes.grid(alpha=0.3, which="both")
+    return figure
+
+
+def best_phase(outputs: Array, target: Target, times: Array) -> float:
+    """Time shift of the target that fits the outputs best: phases drift apart, shapes do not."""
+    sparse = slice(None, None, max(1, len(times) // 2000))
+    shifts = np.linspace(-0.5, 0.5, 401) * target.period
+    costs = [((target.sample(times[sparse] + s) - outputs[sparse]) ** 2).mean() for s in shifts]
+    return float(shifts[int(np.argmin(costs))])
+
+
+mpl.rcParams.update({"axes.titlesize": 10, "axes.labelsize": 9, "legend.fontsize": 9})

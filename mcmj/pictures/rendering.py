@@ -1,0 +1,235 @@
+"""Videos and pictures of a body at work: springs coloured by strain, deformation magnified.
+
+Pictures come from MuJoCo's off-screen renderer, or from matplotlib where there is no OpenGL,
+so that they never depend on a driver.
+"""
+
+import time
+from collections.abc import Iterator, Mapping
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+from statistics import median
+
+import imageio_ffmpeg
+import mediapy
+import numpy as np
+import numpy.typing as npt
+from PIL import Image
+
+from mcmj.core.body import Body
+from mcmj.pictures.caption import Caption
+from mcmj.pictures.film import Film
+from mcmj.pictures.flat_view import FlatView
+from mcmj.pictures.opengl_view import GLView, RenderingUnavailableError
+from mcmj.pictures.panel import Panel
+from mcmj.targets.limit_cycles import Target
+from mcmj.utils.errors import InvalidArgumentError, UnknownNameError
+from mcmj.utils.files import whole_file
+from mcmj.utils.progress import OnSteps
+from mcmj.utils.validation import Array, require_count, require_number
+
+Picture = npt.NDArray[np.uint8]
+
+WIDTH, HEIGHT, PANEL_WIDTH = 640, 480, 384  # pixels of the body's picture; of the panel beside it
+RENDERERS = ("auto", "mujoco", "matplotlib")
+SUFFIXES = (".mp4", ".gif")
+GIF_SHARE = 2  # a GIF is so many times smaller and has so many times fewer frames
+ORBIT_POINTS = 1000  # of a target, as drawn
+
+
+@dataclass
+class Report:
+    """How the pictures were made.
+
+    Attributes:
+        backend: egl, osmesa, window system, or matplotlib.
+        why_flat: why there is no OpenGL, if matplotlib had to do.
+        body_ms, frame_ms: of every picture of the body alone, and with panel and text [ms].
+    """
+
+    backend: str = ""
+    why_flat: str = ""
+    body_ms: list[float] = field(default_factory=list)
+    frame_ms: list[float] = field(default_factory=list)
+
+    @property
+    def metrics(self) -> dict[str, object]:
+        """Medians over the frames, as in metrics.json."""
+        return {
+            "renderer": self.backend,
+            "frames": len(self.frame_ms),
+            "body_frame_ms": median(self.body_ms) if self.body_ms else None,
+            "whole_frame_ms": median(self.frame_ms) if self.frame_ms else None,
+        }
+
+
+@dataclass(frozen=True)
+class Style:
+    """How a film is shown.
+
+    Attributes:
+        fps: frames a second.
+        speed: 1: real time; 2: twice as fast; 0.5: slowed down.
+        renderer: auto (MuJoCo's, or matplotlib without OpenGL), mujoco or matplotlib.
+        samples: of MuJoCo's multisampling; 0: none, the fastest.
+    """
+
+    fps: float = 25.0
+    speed: float = 1.0
+    renderer: str = "auto"
+    samples: int = 0
+
+    def __post_init__(self) -> None:
+        require_number("fps", self.fps, 0.0, open_low=True)
+        require_number("speed", self.speed, 0.0, open_low=True)
+        require_count("samples", self.samples, 0)
+        if self.renderer not in RENDERERS:
+            raise UnknownNameError("renderer", self.renderer, RENDERERS)
+
+    @property
+    def pace(self) -> str:
+        """The speed in words."""
+        if self.speed == 1.0:
+            return "real time"
+        if self.speed > 1.0:
+            return f"{self.speed:g} x faster"
+        return f"slowed {1 / self.speed:g} x"
+
+
+@contextmanager
+def body_view(
+    body: Body, style: Style | None = None, *, width: int = WIDTH, height: int = HEIGHT,
+    report: Report | None = None,
+) -> Iterator[GLView | FlatView]:  # fmt: skip
+    """Something with `draw(positions, strains, arrows)`, see GLView.
+
+    Raises:
+        RenderingUnavailableError: MuJoCo's renderer was asked for, and there is no OpenGL.
+    """
+    style, report = style or Style(), report or Report()
+    view: GLView | FlatView
+    if style.renderer == "matplotlib":
+        view = FlatView(body, width, height)
+    else:
+        try:
+            view = GLView(body, width, height, samples=style.samples)
+        except RenderingUnavailableError as error:
+            if style.renderer == "mujoco":
+                raise
+            report.why_flat = str(error)
+            view = FlatView(body, width, height)
+    report.backend = view.backend
+    with view:
+        yield view
+
+
+def film_frames(
+    film: Film, style: Style | None = None, *, report: Report | None = None
+) -> Iterator[Picture]:
+    """Frames (480, 1024, 3) of a film: the body at work, beside its outputs."""
+    style, report = style or Style(), report or Report()
+    panel = Panel(film.times, film.outputs, film.orbit, film.windows, PANEL_WIDTH, HEIGHT)
+    caption = Caption(film, style.pace, (WIDTH, HEIGHT))
+    with body_view(film.body, style, report=report) as view:
+        for index in film.pick(style.fps, style.speed):
+            start = time.perf_counter()
+            picture = view.draw(
+                film.drawn_positions(index), film.relative_strains(index), film.arrows(index)
+            )
+            drawn = time.perf_counter()
+            whole = np.hstack([caption.write(picture, index), panel.draw(int(index))])
+            report.body_ms.append(1e3 * (drawn - start))
+            report.frame_ms.append(1e3 * (time.perf_counter() - start))
+            yield whole
+
+
+def write_film(
+    film: Film, paths: Mapping[str, Path], style: Style | None = None, *, stills: int = 0,
+    on_frames: OnSteps = lambda frames: None,
+) -> Report:  # fmt: skip
+    """Write a film, each file whole or not at all.
+
+    Args:
+        paths: by suffix, any of ".mp4", ".gif" (smaller and with fewer frames) and ".png": the
+            stem of numbered stills.
+        stills: number of stills, equally spaced in time, the last frame among them.
+        on_frames: called with 1 after every frame, for progress bars.
+
+    Raises:
+        OutputError: a file cannot be written.
+        RenderingUnavailableError: MuJoCo's renderer was asked for, and there is no OpenGL.
+    """
+    style, report = style or Style(), Report()
+    count = len(film.pick(style.fps, style.speed))
+    if count < 2:
+        raise InvalidArgumentError("film", "long enough for two frames", f"{film.times[-1]:g} s")
+    kept = set(np.linspace(0, count - 1, stills + 1).round().astype(int)[1:].tolist())
+    with ExitStack() as stack:
+        mp4 = stack.enter_context(_video(paths[".mp4"], style.fps, 1)) if ".mp4" in paths else None
+        gif = (
+            stack.enter_context(_video(paths[".gif"], style.fps / GIF_SHARE, GIF_SHARE))
+            if ".gif" in paths
+            else None
+        )
+        for number, picture in enumerate(film_frames(film, style, report=report)):
+            if mp4 is not None:
+                mp4.add_image(picture)
+            if gif is not None and number % GIF_SHARE == 0:
+                gif.add_image(np.asarray(Image.fromarray(picture).reduce(GIF_SHARE)))
+            if number in kept and ".png" in paths:
+                write_picture(_numbered(paths[".png"], number), picture)
+            on_frames(1)
+    return report
+
+
+def write_picture(path: Path, picture: Picture) -> None:
+    """Write one PNG, whole or not at all."""
+    with whole_file(path) as temporary:
+        Image.fromarray(picture).save(temporary, format="png")
+
+
+def limit_cycle_video(
+    path: str | Path,
+    body: Body,
+    target: Target,
+    times: Array,
+    positions: Array,
+    outputs: Array,
+    *,
+    seconds: float = 13.0,
+) -> None:
+    """MP4 in real time: the body computing, beside its phase portrait drawing itself.
+
+    Args:
+        times, positions, outputs: the same T control steps: (T,), (T, N, 2), (T, n_outputs).
+        seconds: length of the video, from the first sample on.
+
+    Raises:
+        OutputError: the file cannot be written.
+    """
+    rows = slice(round(seconds / (times[1] - times[0])) + 1)
+    film = Film(
+        body, times[rows], positions[rows], outputs[rows],
+        forces=outputs[rows] @ body.w_fb.T, orbit=target.orbit(ORBIT_POINTS),
+    )  # fmt: skip
+    write_film(film, {".mp4": Path(path)})
+
+
+@contextmanager
+def _video(path: Path, fps: float, share: int) -> Iterator[mediapy.VideoWriter]:
+    """An open video file, MP4 or GIF by its suffix, of frames `share` times smaller."""
+    if path.suffix not in SUFFIXES:
+        raise InvalidArgumentError("path", f"a name that ends with {' or '.join(SUFFIXES)}", path)
+    mediapy.set_ffmpeg(imageio_ffmpeg.get_ffmpeg_exe())
+    shape = (HEIGHT // share, (WIDTH + PANEL_WIDTH) // share)
+    options = {"codec": "gif"} if path.suffix == ".gif" else {"crf": 23}
+    with (
+        whole_file(path) as temporary,
+        mediapy.VideoWriter(temporary, shape, fps=fps, **options) as video,
+    ):
+        yield video
+
+
+def _numbered(stem: Path, number: int) -> Path:
+    return stem.with_name(f"{stem.stem}_{number:04d}.png")

@@ -1,0 +1,151 @@
+"""Reference integrators, sharing no code with MuJoCo's path.
+
+dop853               SciPy's DOP853 in plain NumPy: the exact solution
+semi_implicit_euler  compiled twin of MuJoCo's Euler:  v += h F/m;  p += h v
+rk4                  compiled twin of MuJoCo's RK4
+leapfrog             compiled twin of the leapfrog (mcmj.leapfrog): second order
+toolbox_euler        the authors' scheme: spring rates by backward difference,
+                     x2 = (l_k - l_{k-1}) / h with l_{-1} = l0; p += h v;  v += h F/m
+toolbox_rk           the same with p += h v + h^2 F/2m, what Runge-Kutta gives for a held force
+
+In the toolbox schemes the output y_k = W_out^T l_k is fed back at step k + 1.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+
+from mcmj.core.body import Body
+from mcmj.core.rollout_arguments import Drive, check_drive
+from mcmj.core.trajectory import State, Trajectory
+from mcmj.mjcf.write import checked_readout
+from mcmj.reference.dop853 import RTOL, SMALLEST_RTOL, Signal, integrate_continuous, integrate_held
+from mcmj.reference.twin.population import METHODS as TWINS
+from mcmj.reference.twin.population import Population, rest
+from mcmj.utils.errors import UnknownNameError
+from mcmj.utils.validation import Array, as_array, require_number
+
+METHODS = ("dop853", *TWINS)
+
+
+def integrate(
+    body: Body,
+    *,
+    method: str,
+    steps: int | None = None,
+    timestep: float = 1e-3,
+    inputs: object = None,
+    offset: object = None,
+    gate: object = None,
+    forces: object = None,
+    w_out: object = None,
+    initial_state: State | None = None,
+    rtol: float = RTOL,
+) -> Trajectory:
+    """Run a body as Simulation.rollout does, from rest or from an initial state.
+
+    Args:
+        method: one of METHODS.
+        steps, inputs, offset, gate, forces: as for Simulation.rollout.
+        timestep: control step and, but for dop853, integration step [s].
+        w_out: readout (L, n_outputs), or (L + 1, n_outputs) with a bias in the last row.
+        initial_state: where to start; another run's `final_state` continues it.
+        rtol: relative tolerance of dop853.
+
+    Returns:
+        A trajectory with lengths, outputs and final state.
+
+    Raises:
+        DivergenceError: the body blew up.
+        InvalidArgumentError, UnknownNameError: an argument out of bounds.
+    """
+    if method not in METHODS:
+        raise UnknownNameError("method", method, METHODS)
+    readout = None if w_out is None else checked_readout(body, w_out)
+    drive = check_drive(
+        body,
+        steps=steps,
+        inputs=inputs,
+        offset=offset,
+        gate=gate,
+        forces=forces,
+        closed=readout is not None,
+    )
+    require_number("timestep", timestep, 0.0, open_low=True)
+    start = _checked_state(body, initial_state)
+    if method == "dop853":
+        require_number("rtol", rtol, SMALLEST_RTOL, 1e-2)
+        return integrate_held(body, drive, readout, timestep, start, rtol=rtol)
+    return _integrate_twin(body, drive, readout, method, timestep, start)
+
+
+def integrate_smooth(
+    body: Body,
+    *,
+    steps: int,
+    timestep: float = 1e-3,
+    inputs: Signal | None = None,
+    offset: Signal | None = None,
+    gate: object = None,
+    w_out: object = None,
+    initial_state: State | None = None,
+    rtol: float = RTOL,
+) -> Trajectory:
+    """DOP853 with feedback and signals acting continuously, Eq. (6) as written.
+
+    The integrator takes steps as long as the motion is smooth.
+
+    Args:
+        steps, timestep: samples to record, and their spacing [s].
+        inputs, offset: smooth functions of time [s] -> (n_inputs,), (n_outputs,).
+        gate, w_out, initial_state, rtol: as for `integrate`.
+
+    Raises:
+        DivergenceError, InvalidArgumentError: as for `integrate`.
+    """
+    readout = None if w_out is None else checked_readout(body, w_out)
+    drive = check_drive(
+        body,
+        steps=steps,
+        inputs=None,
+        offset=None,
+        gate=gate,
+        forces=None,
+        closed=readout is not None,
+    )
+    require_number("timestep", timestep, 0.0, open_low=True)
+    require_number("rtol", rtol, SMALLEST_RTOL, 1e-2)
+    return integrate_continuous(
+        body,
+        steps,
+        readout,
+        timestep,
+        _checked_state(body, initial_state),
+        gate=drive.gate,
+        inputs=inputs,
+        offset=offset,
+        rtol=rtol,
+    )
+
+
+def _integrate_twin(
+    body: Body, drive: Drive, w_out: Array | None, method: str, timestep: float, start: State
+) -> Trajectory:
+    population = Population([body], [w_out], method=method, timestep=timestep, states=[start])
+    record, done = population.run(drive, 0, drive.steps)
+    if done[0] < drive.steps:
+        raise population.divergence(0, int(done[0]), drive.steps)
+    times = start.time + timestep * np.arange(drive.steps, dtype=np.float64)
+    final = replace(population.states[0], time=start.time + drive.steps * timestep)
+    return Trajectory(times, record.lengths[0], record.outputs[0], final_state=final)
+
+
+def _checked_state(body: Body, state: State | None) -> State:
+    if state is None:
+        return rest(body)
+    shape = (body.n_nodes, 2)
+    as_array("initial_state.positions", state.positions, shape)
+    as_array("initial_state.velocities", state.velocities, shape)
+    if state.history is not None:
+        as_array("initial_state.history", state.history, (body.n_nodes, 7))
+    return state

@@ -1,0 +1,116 @@
+"""The compiled twin behind the interface of `mcmj.simulation.mujoco_engine.Engine`: Simulation(engine="twin")."""
+
+import numpy as np
+
+from mcmj.core.body import Body, spring_lengths
+from mcmj.core.options import Options
+from mcmj.core.rollout_arguments import Drive
+from mcmj.core.trajectory import State
+from mcmj.reference.twin.population import Population, rest
+from mcmj.utils.errors import InvalidArgumentError, UnknownNameError
+from mcmj.utils.validation import Array, as_array, require_count
+
+# MuJoCo's name -> the twin's method
+TWIN_OF = {"Euler": "semi_implicit_euler", "RK4": "rk4", "leapfrog": "leapfrog"}
+
+
+class TwinEngine:
+    """Copies of one body under a compiled twin; see Simulation for the options.
+
+    Records lengths only: positions and velocities are MuJoCo's to show.
+    """
+
+    def __init__(self, body: Body, options: Options, *, copies: int, threads: int) -> None:
+        require_count("copies", copies, 1)
+        timestep, integrator = options.timestep, options.integrator
+        if integrator not in TWIN_OF:
+            raise UnknownNameError("integrator of the twin", integrator, TWIN_OF)
+        self.body, self.options = body, options
+        self.timestep, self.integrator = timestep, integrator
+        self.copies = copies
+        self._population = Population(
+            [body] * copies,
+            [None] * copies,
+            method=TWIN_OF[integrator],
+            timestep=timestep,
+            threads=threads,
+            packed=copies >= 4,
+        )
+
+    @property
+    def steps_done(self) -> int:
+        """Control steps since the start."""
+        return self._population.steps_done
+
+    def reset(self) -> None:
+        """All copies back to the start, at rest, time 0."""
+        self._population.set_states([rest(self.body)] * self.copies)
+        self._population.steps_done = 0
+
+    def set_readout(self, w_out: Array | None) -> None:
+        """Readouts (rows, n_outputs) for all copies, or (copies, rows, n_outputs)."""
+        shared = w_out is None or w_out.ndim == 2
+        self._population.set_readouts([w_out] * self.copies if shared else list(w_out))  # type: ignore[arg-type]
+
+    @property
+    def state(self) -> State:
+        """Positions and velocities (copies, N, 2) now."""
+        states = self._population.states
+        return State(
+            positions=np.array([s.positions for s in states]),
+            velocities=np.array([s.velocities for s in states]),
+            time=states[0].time,
+        )
+
+    def set_state(self, positions: object, velocities: object) -> None:
+        """Positions and velocities (N, 2) for all copies, or (copies, N, 2); None: as they are."""
+        now = self.state
+        arrays = {"positions": now.positions, "velocities": now.velocities}
+        for name, value in (("positions", positions), ("velocities", velocities)):
+            if value is not None:
+                lead = (self.copies,) if np.ndim(value) == 3 else ()  # type: ignore[arg-type]
+                given = as_array(name, value, (*lead, self.body.n_nodes, 2))
+                arrays[name] = np.where(self.body.fixed[:, None], arrays[name], given)
+        pairs = zip(arrays["positions"], arrays["velocities"], strict=True)
+        self._population.set_states([State(p, v) for p, v in pairs])
+
+    def snapshot(self) -> Array:
+        """Full state (copies, n): all that `restore` needs."""
+        parts = [part.reshape(self.copies, -1) for part in self._population.kernel_state]
+        return np.hstack([*parts, np.full((self.copies, 1), float(self.steps_done))])
+
+    def restore(self, snapshot: Array) -> None:
+        """Continue from a snapshot, bit for bit."""
+        parts = self._population.kernel_state
+        sizes = [part[0].size for part in parts]
+        if np.shape(snapshot) != (self.copies, sum(sizes) + 1):
+            raise InvalidArgumentError(
+                "snapshot", f"shape {(self.copies, sum(sizes) + 1)}", f"shape {np.shape(snapshot)}"
+            )
+        pieces = np.split(snapshot[:, :-1], np.cumsum(sizes)[:-1], axis=1)
+        for part, piece in zip(parts, pieces, strict=True):
+            part[:] = piece.reshape(part.shape)  # NaN marks an empty leapfrog history
+        self._population.steps_done = int(snapshot[0, -1])
+
+    def current_lengths(self) -> Array:
+        """Spring lengths (copies, L) [m] at the current state."""
+        return spring_lengths(self.state.positions, self.body.springs)
+
+    def prepare(self, drive: Drive) -> None:
+        """Nothing to do: the drive goes with every run."""
+
+    def run(self, drive: Drive, record: tuple[str, ...], start: int, stop: int) -> dict[str, Array]:
+        """Control steps start .. stop - 1 of a drive; returns the recorded arrays.
+
+        Raises:
+            DivergenceError: a copy blew up.
+            InvalidArgumentError: asked to record more than lengths.
+        """
+        if set(record) - {"lengths"}:
+            raise InvalidArgumentError("record", "lengths or outputs from the twin", record)
+        taken, done = self._population.run(drive, start, stop, lengths="lengths" in record)
+        dead = np.flatnonzero(done < stop - start)
+        if dead.size:
+            copy = int(dead[0])
+            raise self._population.divergence(copy, int(done[copy]), stop - start)
+        return {"lengths": taken.lengths} if "lengths" in record else {}

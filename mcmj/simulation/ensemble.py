@@ -1,0 +1,57 @@
+"""Copies of one body on several threads: many readouts, inputs or kicks in one rollout."""
+
+import numpy as np
+
+from mcmj.core.body import Body
+from mcmj.core.callbacks.spring_laws import SpringLaw
+from mcmj.core.options import DEFAULT_INTEGRATOR, Options
+from mcmj.simulation.engines import make_engine
+from mcmj.simulation.simulation import Simulation
+from mcmj.simulation.stepsize.limit import warn_if_unstable
+from mcmj.utils.validation import Array, as_array
+
+
+class Ensemble(Simulation):
+    """Copies of one body, each with its own readout, inputs and state, on several threads.
+
+    Like a Simulation, but every recorded array has the copies as its first axis, and
+    `w_out`, `inputs`, `offset`, `forces` (with a time axis), positions and velocities may
+    have it too; without it they are the same for all. Results do not depend on `threads`.
+
+    Args:
+        body, timestep, integrator, springs, feedback_delay, substeps, engine: as for Simulation.
+        copies: number of simulations.
+        threads: number of threads.
+        w_out: readout for all, or (copies, rows, n_outputs).
+    """
+
+    def __init__(
+        self,
+        body: Body,
+        *,
+        copies: int,
+        threads: int = 1,
+        w_out: object = None,
+        timestep: float = 1e-3,
+        integrator: str = DEFAULT_INTEGRATOR,
+        springs: str | SpringLaw = "native",
+        feedback_delay: int = 0,
+        substeps: int = 1,
+        engine: str = "mujoco",
+    ) -> None:
+        options = Options(timestep, integrator, springs, feedback_delay, substeps, engine)
+        self._engine = make_engine(body, options, copies=copies, threads=threads)
+        warn_if_unstable(body, options)
+        self._copies = copies
+        self.set_readout(w_out)
+
+    def _checked_readout(self, w_out: object) -> Array:
+        if np.ndim(w_out) != 3:  # type: ignore[arg-type]
+            return super()._checked_readout(w_out)
+        readouts = as_array("w_out", w_out, (self._copies, None, self.body.n_outputs))
+        for readout in readouts[:1]:  # all have the same shape
+            super()._checked_readout(readout)
+        return readouts
+
+    def _public(self, array: Array) -> Array:
+        return array

@@ -1,0 +1,141 @@
+"""What an experiment's phases say; mcmj.schedule runs them.
+
+    Schedule([Phase(10), Phase(10, freeze=(0,)), Phase(30)])
+
+is 10 s undisturbed, 10 s with output 0 held at its last value, 30 s free. In every phase
+channel c pushes with g_c (w_c . lengths) + o_c(t), the law of mcmj.drive; a phase says what g
+and o are (section 6.1.1 of Hauser et al. 2012 for the perturbations).
+"""
+
+from collections.abc import Sequence
+from dataclasses import KW_ONLY, dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from mcmj.core.body import Body
+from mcmj.mjcf.write import checked_readout
+from mcmj.simulation.damage import checked_cut, checked_masses
+from mcmj.utils.errors import InvalidArgumentError
+from mcmj.utils.validation import as_array, require_count, require_duration, require_number
+
+
+@dataclass(frozen=True)
+class RandomForces:
+    """Horizontal forces on all nodes, uniform in [-scale, scale] [N], drawn once a phase."""
+
+    scale: float
+
+    def __post_init__(self) -> None:
+        require_number("scale", self.scale, 0.0, open_low=True)
+
+
+@dataclass(frozen=True, eq=False)
+class Phase:
+    """A stretch of time under the same conditions; only what is given differs from a free run.
+
+    Attributes:
+        duration: [s].
+        gate: of the feedback channels, a number or (n_outputs,); default 1 with a readout.
+        offset: (n_outputs,) constant, added to the fed-back outputs.
+        freeze: channels that go on feeding back what they fed back last; in a schedule's first
+            phase, the output of that moment. They take no offset.
+        forces: (N,) constant horizontal forces on the nodes [N], or RandomForces.
+        length_noise: standard deviation of white noise, new every step, on the lengths that
+            the readout sees [m].
+        w_out: readout to switch to, for this phase and all after it.
+        cut: springs that break: without force in this phase and ever after.
+        masses: (N,) of the nodes from this phase on [kg].
+        name: for figures and tables.
+    """
+
+    duration: float
+    _: KW_ONLY
+    gate: npt.ArrayLike | None = None
+    offset: npt.ArrayLike | None = None
+    freeze: tuple[int, ...] = ()
+    forces: npt.ArrayLike | RandomForces | None = None
+    length_noise: float = 0.0
+    w_out: npt.ArrayLike | None = None
+    cut: tuple[int, ...] = ()
+    masses: npt.ArrayLike | None = None
+    name: str = ""
+
+    def __post_init__(self) -> None:
+        require_duration("duration", self.duration)
+        require_number("length_noise", self.length_noise, 0.0)
+        for name in ("freeze", "cut"):
+            numbers = getattr(self, name)
+            if not isinstance(numbers, Sequence):
+                raise InvalidArgumentError(name, "a tuple of numbers", repr(numbers))
+            for number in numbers:
+                require_count(name, number, 0)
+        for name in ("offset", "masses"):
+            if getattr(self, name) is not None:
+                as_array(name, getattr(self, name), (None,))
+        if self.forces is not None and not isinstance(self.forces, RandomForces):
+            as_array("forces", self.forces, (None,))
+        if self.w_out is not None:
+            as_array("w_out", self.w_out, (None, None))
+        if self.gate is not None:
+            as_array("gate", np.atleast_1d(np.asarray(self.gate)), (None,))
+
+
+class Schedule:
+    """Phases one after the other.
+
+    Raises:
+        InvalidArgumentError: no phase, or something else than phases.
+    """
+
+    def __init__(self, phases: Sequence[Phase]) -> None:
+        self.phases = tuple(phases)
+        if not self.phases or not all(isinstance(phase, Phase) for phase in self.phases):
+            raise InvalidArgumentError("phases", "at least one Phase, and only phases", phases)
+
+    def __repr__(self) -> str:
+        return f"Schedule({list(self.phases)!r})"
+
+    @property
+    def duration(self) -> float:
+        """Of all phases together [s]."""
+        return sum(phase.duration for phase in self.phases)
+
+    def steps(self, timestep: float) -> list[int]:
+        """Numbers of control steps of the phases.
+
+        Raises:
+            InvalidArgumentError: a phase shorter than a step.
+        """
+        counts = [round(phase.duration / timestep) for phase in self.phases]
+        if min(counts) < 1:
+            raise InvalidArgumentError("duration", f"at least a step of {timestep:g} s", self)
+        return counts
+
+    def check(self, body: Body, timestep: float) -> None:
+        """Check every phase against a body, before anything runs.
+
+        Raises:
+            InvalidArgumentError: a shape, channel or spring that the body does not have.
+        """
+        self.steps(timestep)
+        for phase in self.phases:
+            checked_cut(body, phase.cut)
+            if phase.masses is not None:
+                checked_masses(body, phase.masses)
+            if phase.w_out is not None:
+                checked_readout(body, phase.w_out)
+            if phase.forces is not None and not isinstance(phase.forces, RandomForces):
+                as_array("forces", phase.forces, (body.n_nodes,))
+            if phase.offset is not None:
+                as_array("offset", phase.offset, (body.n_outputs,))
+            if np.ndim(0.0 if phase.gate is None else phase.gate):
+                as_array("gate", phase.gate, (body.n_outputs,))
+            for channel in phase.freeze:
+                if channel >= body.n_outputs:
+                    raise InvalidArgumentError(
+                        "freeze", f"channels 0 to {body.n_outputs - 1}", channel
+                    )
+                if phase.offset is not None and np.asarray(phase.offset)[channel] != 0.0:
+                    raise InvalidArgumentError("offset", f"0 for the frozen channel {channel}",
+                                               phase.offset)  # fmt: skip

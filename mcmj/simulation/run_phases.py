@@ -1,0 +1,136 @@
+"""Phases (mcmj.phases) run one after the other in the compiled loop, reproducible from a seed."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from mcmj.core.body import spring_lengths
+from mcmj.core.trajectory import Trajectory, join
+from mcmj.simulation.phases import Phase, RandomForces, Schedule
+from mcmj.simulation.simulation import CHUNK, Simulation
+from mcmj.utils.errors import InvalidArgumentError
+from mcmj.utils.progress import OnSteps
+from mcmj.utils.seeds import stream
+from mcmj.utils.validation import Array
+
+
+@dataclass(frozen=True)
+class ScheduleRun:
+    """What a schedule did.
+
+    Attributes:
+        trajectory: of all phases together.
+        feedback: (T, n_outputs), g y + o: what the channels really fed back (a feedback delay
+            comes on top); a frozen output is constant here, a noisy one noisy.
+        boundaries: (phases + 1,) indices: phase i is boundaries[i] .. boundaries[i + 1] - 1.
+    """
+
+    trajectory: Trajectory
+    feedback: Array
+    boundaries: tuple[int, ...]
+
+    def phase(self, index: int) -> slice:
+        """Rows of a phase; counts from the end if negative."""
+        n = len(self.boundaries) - 1
+        first = range(n)[index]
+        return slice(self.boundaries[first], self.boundaries[first + 1])
+
+
+def run_schedule(
+    simulation: Simulation,
+    schedule: Schedule,
+    seed: int,
+    *,
+    record: Sequence[str] = ("outputs",),
+    on_steps: OnSteps = lambda steps: None,
+) -> ScheduleRun:
+    """Run a schedule from the simulation's state on; the same seed gives the same bits.
+
+    Readouts, cut springs and masses stay as the last phase left them.
+
+    Args:
+        seed: of random forces and noise.
+        record: as for Simulation.rollout; outputs always are.
+        on_steps: called with the number of steps done after every chunk, for progress bars.
+
+    Raises:
+        DivergenceError: the body blew up.
+        InvalidArgumentError: a phase that does not fit the body.
+    """
+    if simulation.state.positions.ndim != 2:
+        raise InvalidArgumentError("simulation", "a Simulation", type(simulation).__name__)
+    schedule.check(simulation.body, simulation.timestep)
+    if any(phase.cut or phase.masses is not None for phase in schedule.phases):
+        _ = simulation.model  # only MuJoCo's bodies can change: said before anything runs
+    forces, noise = stream(seed, "schedule_forces"), stream(seed, "schedule_noise")
+    counts = schedule.steps(simulation.timestep)
+    parts: list[Trajectory] = []
+    feedback: list[Array] = []
+    for phase, steps in zip(schedule.phases, counts, strict=True):
+        last = feedback[-1][-1] if feedback else None
+        for part, pushed in _run_phase(simulation, phase, steps, last, forces, noise, record):
+            parts.append(part)
+            feedback.append(pushed)
+            on_steps(len(part))
+    boundaries = tuple(int(n) for n in np.cumsum([0, *counts]))
+    return ScheduleRun(join(parts), np.concatenate(feedback), boundaries)
+
+
+def _run_phase(
+    simulation: Simulation,
+    phase: Phase,
+    steps: int,
+    last: Array | None,
+    forces_of: np.random.Generator,
+    noise_of: np.random.Generator,
+    record: Sequence[str],
+) -> Iterator[tuple[Trajectory, Array]]:
+    """Chunks of a phase, and what was fed back during each."""
+    body = simulation.body
+    if phase.w_out is not None:
+        simulation.set_readout(phase.w_out)
+    if phase.cut or phase.masses is not None:
+        simulation.alter(cut=phase.cut, masses=phase.masses)
+    forces = phase.forces
+    if isinstance(forces, RandomForces):
+        forces = forces_of.uniform(-forces.scale, forces.scale, body.n_nodes)
+    gate, constant = _gate_and_offset(simulation, phase, last)
+    w_out = simulation.w_out
+    for start in range(0, steps, CHUNK):
+        n = min(CHUNK, steps - start)
+        offset = np.tile(constant, (n, 1))
+        if phase.length_noise > 0 and w_out is not None:
+            noise = phase.length_noise * noise_of.standard_normal((n, body.n_springs))
+            # not matmul: its last bits depend on the number of rows
+            offset += gate * np.einsum("tl,lc->tc", noise, w_out[: body.n_springs])
+        part = simulation.rollout(
+            offset=offset, gate=gate, forces=forces, record=tuple({*record, "outputs"})
+        )
+        yield part, gate * part.get("outputs") + offset
+
+
+def _gate_and_offset(
+    simulation: Simulation, phase: Phase, last: Array | None
+) -> tuple[Array, Array]:
+    """Gate and constant offset (n_outputs,) of a phase; frozen channels hold what was `last`."""
+    body, w_out = simulation.body, simulation.w_out
+    gate = np.full(body.n_outputs, float(w_out is not None))
+    if phase.gate is not None:
+        gate[:] = phase.gate
+    offset = np.zeros(body.n_outputs)
+    if phase.offset is not None:
+        offset[:] = phase.offset
+    if phase.freeze:
+        frozen = list(phase.freeze)
+        held = _outputs_now(simulation) if last is None else last
+        gate[frozen], offset[frozen] = 0.0, held[frozen]
+    return gate, offset
+
+
+def _outputs_now(simulation: Simulation) -> Array:
+    body, w_out = simulation.body, simulation.w_out
+    if w_out is None:
+        return np.zeros(body.n_outputs)
+    lengths = spring_lengths(simulation.state.positions, body.springs)
+    return lengths @ w_out[: body.n_springs] + w_out[body.n_springs :].sum(axis=0)

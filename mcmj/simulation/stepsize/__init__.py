@@ -1,0 +1,1 @@
+"""The largest step at which an integrator is stable, from the linearised springs."""

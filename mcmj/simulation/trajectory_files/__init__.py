@@ -1,0 +1,1 @@
+"""Recorded trajectories as files: NPZ, Zarr, and HDF5 for OpenPRC."""

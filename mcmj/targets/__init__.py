@@ -1,0 +1,1 @@
+"""What is taught: limit cycles, gaits, rhythms that an input drives, filters."""

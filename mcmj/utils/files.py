@@ -1,0 +1,138 @@
+"""Result files: whole or not at all, each with its config, seed and versions. No pickle."""
+
+import dataclasses
+import functools
+import json
+import os
+import platform
+import shutil
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, suppress
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from mcmj.utils.errors import InvalidArgumentError, OutputError
+
+_PACKAGES = ("mcmj", "mujoco", "numpy", "scipy", "numba")
+
+
+def versions() -> dict[str, str]:
+    """Versions of what a result depends on."""
+    return dict(_versions())
+
+
+@functools.cache  # reading them takes milliseconds
+def _versions() -> dict[str, str]:
+    found = {"python": platform.python_version()}
+    for package in _PACKAGES:
+        try:
+            found[package] = version(package)
+        except PackageNotFoundError:
+            found[package] = "not installed"
+    return found
+
+
+def prepare_folder(folder: str | Path) -> Path:
+    """Make a folder for results and check that it can be written, before any long work.
+
+    Raises:
+        OutputError: it cannot.
+    """
+    path = Path(folder)
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+        probe = path / f".probe-{os.getpid()}"
+        probe.touch()
+        probe.unlink()
+    except OSError as error:
+        raise OutputError(f"cannot write to the output folder {path}: {error.strerror}") from error
+    return path
+
+
+@contextmanager
+def whole_file(path: str | Path, *, folder: bool = False) -> Iterator[Path]:
+    """A temporary path beside `path` that takes its place if the block succeeds.
+
+    Args:
+        folder: for formats that are folders; the block gets an empty one to fill.
+
+    Raises:
+        OutputError: the disk or the folder does not take it.
+    """
+    final = Path(path)
+    temporary = final.with_name(f".{os.getpid()}-{final.name}")
+    try:
+        if folder:
+            temporary.mkdir()
+        yield temporary
+        if folder:  # only an empty one can be replaced
+            shutil.rmtree(final, ignore_errors=True)
+        os.replace(temporary, final)
+    except OSError as error:
+        raise OutputError(f"cannot write {final}: {error.strerror or error}") from error
+    finally:
+        with suppress(OSError):
+            if folder:
+                shutil.rmtree(temporary, ignore_errors=True)
+            else:
+                temporary.unlink(missing_ok=True)
+
+
+def write_text(path: str | Path, text: str) -> None:
+    """Write a text file, whole or not at all."""
+    with whole_file(path) as temporary:
+        temporary.write_text(text, encoding="utf-8")
+
+
+def write_metrics(
+    path: str | Path, scenario: str, config: object, seed: int, metrics: Mapping[str, object]
+) -> None:
+    """metrics.json: {"scenario", "config", "seed", "versions", "metrics"}."""
+    document = {
+        "scenario": scenario,
+        "config": plain(config),
+        "seed": seed,
+        "versions": versions(),
+        "metrics": plain(metrics),
+    }
+    write_text(path, json.dumps(document, indent=2, allow_nan=False) + "\n")
+
+
+def write_arrays(
+    path: str | Path, arrays: Mapping[str, np.ndarray], config: object, seed: int
+) -> None:
+    """An NPZ file of arrays, with config, seed and versions as JSON text in `provenance`."""
+    for name, array in arrays.items():
+        if np.asarray(array).dtype.hasobject:
+            raise InvalidArgumentError(f"arrays[{name!r}]", "numbers, not Python objects", array)
+    with whole_file(path) as temporary, temporary.open("wb") as file:
+        origin = np.array(json.dumps(account(config, seed)))
+        contents: dict[str, Any] = {"provenance": origin, **arrays}
+        np.savez_compressed(file, **contents)
+
+
+def account(config: object, seed: int) -> dict[str, object]:
+    """Where a file comes from: config, seed and versions, as JSON types."""
+    return {"config": plain(config), "seed": seed, "versions": versions()}
+
+
+def plain(value: object) -> object:
+    """`value` with dataclasses, arrays, paths and NumPy numbers as JSON types; NaN as null."""
+    if dataclasses.is_dataclass(value) and not isinstance(value, type):
+        return {f.name: plain(getattr(value, f.name)) for f in dataclasses.fields(value)}
+    if isinstance(value, Mapping):
+        return {str(key): plain(item) for key, item in value.items()}
+    if isinstance(value, np.ndarray):
+        return plain(value.tolist())
+    if isinstance(value, list | tuple):
+        return [plain(item) for item in value]
+    if isinstance(value, np.generic):
+        return plain(value.item())
+    if isinstance(value, float):
+        return value if np.isfinite(value) else None
+    if value is None or isinstance(value, bool | int | str):
+        return value
+    return str(value)

@@ -1,0 +1,123 @@
+"""The reproduction: claims judged by numbers, runs resumed, a page that needs no other file."""
+
+import re
+import shutil
+import subprocess
+
+import numpy as np
+import pytest
+
+from mcmj.experiments.reproduce.claims import Claim, Run, chosen, judge
+from mcmj.experiments.reproduce.page import page
+from mcmj.experiments.reproduce.paper import PARTS
+from mcmj.experiments.reproduce.runner import execute, finished, metrics_of
+from mcmj.pictures.plotting import new_figure, save
+from mcmj.utils.errors import McmjError, UnknownNameError
+from mcmj.utils.files import write_metrics
+
+METRICS = {"a": {"x": 0.01, "y": [0.02, None]}, "b": [{"z": 1.0}, {"z": 0.04}]}
+SCRIPT = """
+import json, pathlib, sys
+out = pathlib.Path(sys.argv[sys.argv.index("--out") + 1])
+out.mkdir(parents=True)
+if "--fail" in sys.argv:
+    sys.exit("it went wrong")
+count = out.parent / "count"
+count.write_text(str(int(count.read_text()) + 1) if count.exists() else "1")
+(out / "metrics.json").write_text(json.dumps({"metrics": {"a": 1}}))
+"""
+
+PROBE = """<script>onload = () => {
+document.title = [...document.images].every(image => image.naturalWidth > 100)
+    ? "all pictures shown" : "a picture is missing" }</script>"""
+
+
+def test_all_numbers_of_a_claim_count_and_null_is_infinite():
+    outcome = judge(Claim("it works", "yes", "run", ("a/x", "a/y/*", "b/*/z")), METRICS)
+    assert outcome.values == (0.01, 0.02, np.inf, 1.0, 0.04)
+    assert outcome.rate["successes"] == 3
+    with pytest.raises(UnknownNameError, match="unknown number of the metrics 'a/w'"):
+        judge(Claim("it works", "yes", "run", ("a/x", "a/w")), METRICS)
+
+
+def test_a_claim_holds_unless_the_successes_refute_it():
+    claim = Claim("it works", "yes", "run", ("b/*/z",))
+    half = judge(claim, METRICS)
+    assert half.rate["successes"] == 1
+    assert half.holds  # 1 of 2 does not refute 90 %
+    many = judge(claim, {"b": [{"z": 1.0}] * 10 + [{"z": 0.0}] * 10})
+    assert not many.holds  # 10 of 20 do
+    strict = judge(Claim("all", "all", "run", ("b/*/z",), needed=1.0), METRICS)
+    assert not strict.holds
+    assert many.ours == "50.00% (0.00% to 100.00%)"
+
+
+def test_parts_are_chosen_by_name():
+    assert [part.name for part in chosen(PARTS, ["fig6"])] == ["fig6"]
+    assert chosen(PARTS, []) == list(PARTS)
+    with pytest.raises(UnknownNameError, match="fig5"):
+        chosen(PARTS, ["fig99"])
+    runs = {run.name for part in PARTS for run in part.runs}
+    assert all(claim.run in runs for part in PARTS for claim in part.claims)
+
+
+def test_a_finished_command_is_not_run_again_and_a_failed_one_is(tmp_path):
+    (tmp_path / "script.py").write_text(SCRIPT)
+    run, out = Run("one", "script", (), ()), tmp_path / "out"
+    assert not finished(run, (), out)
+    execute(run, (), out, tmp_path)
+    assert finished(run, (), out)
+    assert not finished(run, ("--more",), out)  # another command
+    assert metrics_of(run, out) == {"a": 1}
+    with pytest.raises(McmjError, match="script --fail failed: it went wrong"):
+        execute(run, ("--fail",), out, tmp_path)
+    assert not finished(run, ("--fail",), out)
+    execute(run, (), out, tmp_path)
+    assert (out / "count").read_text() == "2"
+
+
+@pytest.fixture
+def document(tmp_path):
+    figure = new_figure(2.0, 2.0)
+    figure.add_subplot().plot([0, 1])
+    save(figure, tmp_path / "run.png")
+    part = PARTS[2]
+    outcome = judge(Claim("<works> & holds", "yes", "run", ("a/x",)), METRICS)
+    html = page(
+        "A <title>", [part], {part.name: [outcome]}, {part.name: [tmp_path / "run.png"]},
+        {part.name: ["sh scripts/run.sh perturb"]}, "{}",
+    )  # fmt: skip
+    (tmp_path / "page.html").write_text(html)
+    return tmp_path / "page.html"
+
+
+def test_the_page_refers_to_nothing_outside(document):
+    html = document.read_text()
+    assert "&lt;works&gt; &amp; holds" in html
+    sources = re.findall(r'(?:src|href)="([^"]*)"', html)
+    assert sources
+    assert all(source.startswith(("data:", "#")) for source in sources)
+    anchors = {source[1:] for source in sources if source.startswith("#")}
+    assert anchors <= set(re.findall(r'id="([^"]*)"', html))
+
+
+@pytest.mark.skipif(shutil.which("chromium") is None, reason="no chromium")
+def test_a_browser_shows_the_page_with_its_pictures(document, tmp_path):
+    """Headless Chromium lays it out; every picture has a size of its own."""
+    document.write_text(document.read_text().replace("</body>", PROBE + "</body>"))
+    done = subprocess.run(
+        ["chromium", "--headless", "--no-sandbox", "--disable-gpu", "--no-first-run",
+         "--disable-background-networking", "--disable-component-update", "--disable-sync",
+         f"--user-data-dir={tmp_path / 'profile'}", "--virtual-time-budget=5000", "--dump-dom",
+         document.as_uri()],
+        capture_output=True, text=True, timeout=120,
+    )  # fmt: skip
+    assert "<title>all pictures shown</title>" in done.stdout, done.stderr[-500:]
+
+
+def test_an_account_of_another_version_is_not_taken(tmp_path):
+    run = Run("one", "script", (), ())
+    (tmp_path / "one").mkdir()
+    write_metrics(tmp_path / "one" / "metrics.json", "script", {}, 0, {})
+    (tmp_path / "one" / "account.json").write_text("{}")
+    assert not finished(run, (), tmp_path)
