@@ -2,11 +2,71 @@
 
 A compliant body (a random planar network of masses and nonlinear springs) computes; only a
 linear, static readout of its spring lengths is trained (Hauser et al., Biol. Cybern. 2012).
+
+Names are loaded when they are first used, so that `import mcmj` costs little.
 """
 
 import ctypes.util
+import importlib
 import os
 import sys
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from mcmj import reference as reference
+    from mcmj.core.body import Body as Body
+    from mcmj.core.callbacks.spring_laws import SpringLaw as SpringLaw
+    from mcmj.core.random_body import random_body as random_body
+    from mcmj.learning.lessons import Teaching as Teaching
+    from mcmj.learning.regression import fit_readout as fit_readout
+    from mcmj.learning.teaching import teach as teach
+    from mcmj.mjcf.read import from_mjcf as from_mjcf
+    from mcmj.mjcf.write import to_mjcf as to_mjcf
+    from mcmj.simulation.ensemble import Ensemble as Ensemble
+    from mcmj.simulation.phases import Phase as Phase
+    from mcmj.simulation.phases import RandomForces as RandomForces
+    from mcmj.simulation.phases import Schedule as Schedule
+    from mcmj.simulation.run_phases import run_schedule as run_schedule
+    from mcmj.simulation.simulation import Simulation as Simulation
+    from mcmj.targets.limit_cycles import Target as Target
+    from mcmj.targets.limit_cycles import target as target
+    from mcmj.utils.errors import McmjError as McmjError
+
+__version__ = "0.1.0"
+
+_PLACES = {
+    "Body": "core.body",
+    "Ensemble": "simulation.ensemble",
+    "McmjError": "utils.errors",
+    "Phase": "simulation.phases",
+    "RandomForces": "simulation.phases",
+    "Schedule": "simulation.phases",
+    "Simulation": "simulation.simulation",
+    "SpringLaw": "core.callbacks.spring_laws",
+    "Target": "targets.limit_cycles",
+    "Teaching": "learning.lessons",
+    "fit_readout": "learning.regression",
+    "from_mjcf": "mjcf.read",
+    "random_body": "core.random_body",
+    "run_schedule": "simulation.run_phases",
+    "target": "targets.limit_cycles",
+    "teach": "learning.teaching",
+    "to_mjcf": "mjcf.write",
+}
+
+
+def __getattr__(name: str) -> object:
+    if name == "reference":
+        return importlib.import_module("mcmj.reference")
+    if name not in _PLACES:
+        raise AttributeError(f"module 'mcmj' has no attribute {name!r}")
+    found = getattr(importlib.import_module(f"mcmj.{_PLACES[name]}"), name)
+    globals()[name] = found
+    return found
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *_PLACES, "reference"})
 
 
 def _choose_gl() -> None:
@@ -20,40 +80,3 @@ def _choose_gl() -> None:
 
 
 _choose_gl()
-
-from mcmj import reference  # noqa: E402
-from mcmj.core.body import Body  # noqa: E402  (mujoco reads MUJOCO_GL at import)
-from mcmj.core.callbacks.spring_laws import SpringLaw  # noqa: E402
-from mcmj.core.random_body import random_body  # noqa: E402
-from mcmj.learning.lessons import Teaching  # noqa: E402
-from mcmj.learning.regression import fit_readout  # noqa: E402
-from mcmj.learning.teaching import teach  # noqa: E402
-from mcmj.mjcf.read import from_mjcf  # noqa: E402
-from mcmj.mjcf.write import to_mjcf  # noqa: E402
-from mcmj.simulation.ensemble import Ensemble  # noqa: E402
-from mcmj.simulation.phases import Phase, RandomForces, Schedule  # noqa: E402
-from mcmj.simulation.run_phases import run_schedule  # noqa: E402
-from mcmj.simulation.simulation import Simulation  # noqa: E402
-from mcmj.targets.limit_cycles import Target, target  # noqa: E402
-from mcmj.utils.errors import McmjError  # noqa: E402
-
-__all__ = [
-    "Body",
-    "Ensemble",
-    "McmjError",
-    "Phase",
-    "RandomForces",
-    "Schedule",
-    "Simulation",
-    "SpringLaw",
-    "Target",
-    "Teaching",
-    "fit_readout",
-    "from_mjcf",
-    "random_body",
-    "reference",
-    "run_schedule",
-    "target",
-    "teach",
-    "to_mjcf",
-]

@@ -1,4 +1,4 @@
-"""Measure every speed claim of mcmj on this machine: ratios, medians, side by side. The same as `mcmj benchmark`."""
+"""The same as `mcmj benchmark`."""
 
 from mcmj.__main__ import main
 

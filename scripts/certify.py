@@ -1,4 +1,4 @@
-"""Report card of a trained body: errors, Floquet multipliers, region of attraction, tolerances. The same as `mcmj certify`."""
+"""The same as `mcmj certify`."""
 
 from mcmj.__main__ import main
 

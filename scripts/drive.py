@@ -1,4 +1,4 @@
-"""The cross-entropy method learns to drive a body by its input channel, as a dm_control task. The same as `mcmj drive`."""
+"""The same as `mcmj drive`."""
 
 from mcmj.__main__ import main
 

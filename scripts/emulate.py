@@ -1,4 +1,4 @@
-"""A nonlinear spring becomes another system by static feedback: error and order by integrator. The same as `mcmj emulate`."""
+"""The same as `mcmj emulate`."""
 
 from mcmj.__main__ import main
 

@@ -1,4 +1,4 @@
-"""Open-loop filters against regression without a body, and a switch that needs feedback. The same as `mcmj filters`."""
+"""The same as `mcmj filters`."""
 
 from mcmj.__main__ import main
 

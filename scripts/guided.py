@@ -1,4 +1,4 @@
-"""Guided search for settings of any experiment (Optuna), judged on bodies it has not seen. The same as `mcmj guided`."""
+"""The same as `mcmj guided`."""
 
 from mcmj.__main__ import main
 

@@ -1,4 +1,4 @@
-"""The largest stable step of every integrator on the hard cases: bisected, and predicted. The same as `mcmj hard_cases`."""
+"""The same as `mcmj hard_cases`."""
 
 from mcmj.__main__ import main
 

@@ -1,4 +1,4 @@
-"""Fig. 5: teach a body a limit cycle and let it run free in MuJoCo. The same as `mcmj limit_cycle`."""
+"""The same as `mcmj limit_cycle`."""
 
 from mcmj.__main__ import main
 

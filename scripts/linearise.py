@@ -1,4 +1,4 @@
-"""Feedback linearisability by Lie brackets, and why arrays of linear springs need diversity. The same as `mcmj linearise`."""
+"""The same as `mcmj linearise`."""
 
 from mcmj.__main__ import main
 

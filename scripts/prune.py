@@ -1,4 +1,4 @@
-"""Which springs must be sensed: closed-loop error against the number of springs read. The same as `mcmj prune`."""
+"""The same as `mcmj prune`."""
 
 from mcmj.__main__ import main
 

@@ -1,4 +1,4 @@
-"""A film of a body at work, as MP4, GIF and PNG: from a body file, or from a trajectory file. The same as `mcmj render`."""
+"""The same as `mcmj render`."""
 
 from mcmj.__main__ import main
 

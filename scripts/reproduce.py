@@ -1,4 +1,4 @@
-"""Everything in the paper: every claim with ours beside it, every figure, as one page. The same as `mcmj reproduce`."""
+"""The same as `mcmj reproduce`."""
 
 from mcmj.__main__ import main
 

@@ -1,4 +1,4 @@
-"""The work-precision diagram: error against DOP853 over cost, every integrator, several bodies. The same as `mcmj speed_accuracy`."""
+"""The same as `mcmj speed_accuracy`."""
 
 from mcmj.__main__ import main
 

@@ -1,4 +1,4 @@
-"""How many random bodies of consecutive seeds learn all three limit cycles. The same as `mcmj success_rate`."""
+"""The same as `mcmj success_rate`."""
 
 from mcmj.__main__ import main
 

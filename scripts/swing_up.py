@@ -1,4 +1,4 @@
-"""Fig. 7: a taught body swings up from total rest. With --seeds n: how many random bodies do. The same as `mcmj swing_up`."""
+"""The same as `mcmj swing_up`."""
 
 from mcmj.__main__ import main
 

@@ -1,4 +1,4 @@
-"""Watch a body at work in MuJoCo's viewer, its loop closed, and disturb it. The same as `mcmj view`."""
+"""The same as `mcmj view`."""
 
 from mcmj.__main__ import main
 

@@ -1,1 +1,4 @@
-"""What springs can compute, by theory (Lie brackets, arrays, emulation); `stability/` of what was learned."""
+"""What springs can compute, by theory: Lie brackets, arrays of springs, emulation.
+
+`stability/` judges what was learned.
+"""

@@ -1,4 +1,4 @@
-"""What an experiment is made of: the body, its springs' laws, a readout, an integrator, a trajectory.
+"""What an experiment is made of: body, spring laws, readout, integrator, trajectory.
 
 Plain data, checked on construction. `callbacks/` holds what MuJoCo calls within a step.
 """

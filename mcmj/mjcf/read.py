@@ -1,4 +1,4 @@
-"""MJCF -> Body: read back what `mcmj.mjcf.write` wrote, to the bit, from a file or a compiled model."""
+"""MJCF -> Body: what `mcmj.mjcf.write` wrote, to the bit, from a file or a compiled model."""
 
 import json
 import re

@@ -1,1 +1,5 @@
-"""Integrators that share no code with MuJoCo: DOP853, and the compiled twin of each of its steps."""
+"""Integrators that share no code with MuJoCo: DOP853, and compiled twins of each of its steps."""
+
+from mcmj.reference.integration import METHODS, integrate
+
+__all__ = ["METHODS", "integrate"]

@@ -212,7 +212,7 @@ BRIEF = Config(
 @pytest.mark.slow
 def test_a_certificate_is_complete_and_its_numbers_are_those_of_its_parts():
     stages = []
-    result = certify.run(BRIEF, on_stages=stages.append)
+    result = certify.run(BRIEF, on_steps=stages.append)
     assert sum(stages) == len(certify.STAGES)
     table = result.metrics
     assert table["basin_fraction"] == 1.0

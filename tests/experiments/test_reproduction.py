@@ -3,6 +3,7 @@
 import re
 import shutil
 import subprocess
+import sys
 
 import numpy as np
 import pytest
@@ -63,16 +64,17 @@ def test_parts_are_chosen_by_name():
 
 def test_a_finished_command_is_not_run_again_and_a_failed_one_is(tmp_path):
     (tmp_path / "script.py").write_text(SCRIPT)
+    program = (sys.executable, str(tmp_path / "script.py"))
     run, out = Run("one", "script", (), ()), tmp_path / "out"
     assert not finished(run, (), out)
-    execute(run, (), out, tmp_path)
+    execute(run, (), out, program)
     assert finished(run, (), out)
     assert not finished(run, ("--more",), out)  # another command
     assert metrics_of(run, out) == {"a": 1}
     with pytest.raises(McmjError, match="script --fail failed: it went wrong"):
-        execute(run, ("--fail",), out, tmp_path)
+        execute(run, ("--fail",), out, program)
     assert not finished(run, ("--fail",), out)
-    execute(run, (), out, tmp_path)
+    execute(run, (), out, program)
     assert (out / "count").read_text() == "2"
 
 

@@ -13,7 +13,7 @@ import pytest
 import mcmj
 from mcmj.mjcf.read import load_model, provenance_of_model, readouts_of_model
 
-SCRIPTS = Path(__file__).parent.parent / "scripts"
+SCRIPTS = Path(__file__).parents[2] / "scripts"
 SHORT = ["--duration", "8", "--washout", "2", "--free-run", "13", "--window", "12", "--no-video"]
 
 

@@ -20,7 +20,7 @@ from mcmj.mjcf.bundled import body_names, body_path
 from mcmj.mjcf.read import load_model, provenance_of_model, readouts_of_model
 from mcmj.utils.errors import OtherPhysicsWarning, UnknownNameError
 
-SCRIPTS = Path(__file__).parent.parent / "scripts"
+SCRIPTS = Path(__file__).parents[2] / "scripts"
 SPECIALISED = {"van_der_pol": (10, 22), "quadratic": (20, 51), "lissajous": (20, 48)}
 
 

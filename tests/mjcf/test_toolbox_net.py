@@ -11,7 +11,7 @@ from mcmj.mjcf.toolbox_net import load_toolbox_net
 from mcmj.reference.integration import integrate
 from mcmj.utils.errors import BodyFileError, UnknownNameError
 
-FIXTURE = Path(__file__).parent / "data" / "toolbox_rk.npz"
+FIXTURE = Path(__file__).parents[1] / "data" / "toolbox_rk.npz"
 
 
 @pytest.fixture(scope="module")

@@ -37,7 +37,7 @@ from mcmj.pictures.rendering import (
 from mcmj.simulation.trajectory_files.npz import save_trajectory
 from mcmj.utils.errors import InvalidArgumentError, TrajectoryFileError, UnknownNameError
 
-SCRIPT = Path(__file__).parent.parent / "scripts" / "render.py"
+SCRIPT = Path(__file__).parents[2] / "scripts" / "render.py"
 
 
 @pytest.fixture(scope="module", params=["mujoco", "matplotlib"])

@@ -11,7 +11,7 @@ from mcmj.core.body import spring_lengths
 from mcmj.reference.integration import METHODS, integrate, integrate_smooth
 from mcmj.utils.errors import DivergenceError, UnknownNameError
 
-FIXTURE = Path(__file__).parent / "data" / "toolbox_rk.npz"
+FIXTURE = Path(__file__).parents[1] / "data" / "toolbox_rk.npz"
 
 
 @pytest.fixture(scope="module")

@@ -21,7 +21,7 @@ from mcmj.search.workers import Inline
 from mcmj.utils.errors import InvalidArgumentError, McmjError, UnknownNameError
 from mcmj.utils.files import plain
 
-SCRIPTS = Path(__file__).parent.parent / "scripts"
+SCRIPTS = Path(__file__).parents[2] / "scripts"
 SMALL = {"set": SET, "seeds": 4, "confirm": 3, "audit": 2, "best": 2, "workers": 1}
 
 

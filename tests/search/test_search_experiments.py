@@ -103,7 +103,7 @@ def test_the_score_of_an_experiment_is_its_own_unless_told_otherwise():
     assert search.Config(set=settings, seeds=1, score="a/b").target.path == "a/b"
 
 
-ROOT = Path(__file__).parent.parent
+ROOT = Path(__file__).parents[2]
 BLOCKS = [
     block
     for page in [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]

@@ -42,7 +42,7 @@ def test_edited_code_never_gives_old_scores(tmp_path):
     package = tmp_path / "dances"
     package.mkdir()
     (package / "waltz.py").write_text(MODULE)
-    path = os.pathsep.join([str(tmp_path), str(Path(__file__).parents[1])])
+    path = os.pathsep.join([str(tmp_path), str(Path(__file__).parents[2])])
 
     def score():
         return subprocess.run(

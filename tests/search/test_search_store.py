@@ -24,7 +24,7 @@ from mcmj.search.runner import run_trials
 from mcmj.search.workers import Inline
 from mcmj.utils.errors import InvalidArgumentError, McmjError, OutputError, StoreError
 
-SEARCH = Path(__file__).parent.parent / "scripts" / "search.py"
+SEARCH = Path(__file__).parents[2] / "scripts" / "search.py"
 
 
 def outcome(error=0.25, **changes):

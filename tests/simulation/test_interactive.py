@@ -17,7 +17,7 @@ from mcmj.pictures.viewer import NoDisplayError, shown_model
 from mcmj.simulation.interactive import LiveLoop
 from mcmj.utils.errors import InvalidArgumentError, UnknownNameError
 
-SCRIPT = Path(__file__).parent.parent / "scripts" / "view.py"
+SCRIPT = Path(__file__).parents[2] / "scripts" / "view.py"
 
 
 @pytest.fixture

@@ -1,4 +1,4 @@
-"""Seeded mutations of body files: python tests/fuzz_body_files.py --seconds 60 [--seed 0]
+"""Seeded mutations of body files: python tests/support/fuzz_body_files.py --seconds 60 [--seed 0]
 
 Batches run in processes of their own: a crash or a hang names the seed that repeats it.
 """

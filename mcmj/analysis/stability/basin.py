@@ -159,7 +159,8 @@ def pushed(
         forces: None: none.
         duration: of the forces [s].
         refine: steps that much smaller. Hard blows move nodes faster than the cubic dampers
-            allow at 1 ms (`mcmj.simulation.stepsize.limit`): without it the integrator fails, not the body.
+            allow at 1 ms (`mcmj.simulation.stepsize.limit`): without it the integrator fails,
+            not the body.
     """
     fine = replace(loop, timestep=loop.timestep / refine)
     rows = None if forces is None else forces[:, None]

@@ -1,3 +1,6 @@
-"""Measure every speed claim of mcmj on this machine: ratios, medians, side by side."""
+"""Every speed claim of mcmj, measured on this machine.
+
+Ratios are medians, measured side by side.
+"""
 
 GROUP = "speed and accuracy"

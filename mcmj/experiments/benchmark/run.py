@@ -1,7 +1,6 @@
 """All speed claims in one place: ratios measured side by side, medians of several rounds."""
 
 import time
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import mujoco
@@ -16,6 +15,7 @@ from mcmj.experiments.benchmark.process import machine, memory, start_up
 from mcmj.reference.twin.population import Population
 from mcmj.simulation.ensemble import Ensemble
 from mcmj.simulation.simulation import Simulation
+from mcmj.utils.progress import OnSteps
 from mcmj.utils.timing import Work, interleaved_seconds, median_ratio
 
 BATCH = 64  # bodies in one call of the twin
@@ -29,13 +29,13 @@ class Result:
     metrics: dict[str, object]
 
 
-def run(config: Config, *, on_parts: Callable[[int], object] = lambda parts: None) -> Result:
-    """Measure everything; PARTS times `on_parts(1)` is called."""
+def run(config: Config, *, on_steps: OnSteps = lambda steps: None) -> Result:
+    """Measure everything; PARTS times `on_steps(1)` is called."""
     metrics: dict[str, object] = {"machine": machine()}
     body = random_body(config.seed, config.nodes)
     for part in PARTS:
         metrics.update(part(config, body))
-        on_parts(1)
+        on_steps(1)
     return Result(config, metrics)
 
 

@@ -1,3 +1,6 @@
-"""Memory and processing capacity, kernel and generalisation rank of a body; maps of them."""
+"""Memory and processing capacity of a body, and its ranks.
+
+Maps of them over stiffness, damping, size and input strength.
+"""
 
 GROUP = "analysis"

@@ -5,7 +5,6 @@ its lengths at the end of each. One body in MuJoCo; then maps over stiffness and
 over size and input strength, by the compiled twin (same bits but for rounding, faster).
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from itertools import product
 from typing import Any
@@ -20,6 +19,7 @@ from mcmj.simulation.ensemble import Ensemble
 from mcmj.simulation.held_symbols import held_states
 from mcmj.simulation.simulation import Simulation
 from mcmj.utils.errors import DivergenceError, InvalidArgumentError
+from mcmj.utils.progress import OnSteps
 from mcmj.utils.seeds import stream
 from mcmj.utils.validation import (
     Array,
@@ -169,15 +169,15 @@ class Result:
         }
 
 
-def run(config: Config, *, on_bodies: Callable[[int], object] = lambda bodies: None) -> Result:
+def run(config: Config, *, on_steps: OnSteps = lambda steps: None) -> Result:
     """Measure one body in MuJoCo, then the maps' bodies."""
     body = draw_body(config.seed, config.settings)
     worth = measure(config, body, config.strength, config.symbols, engine="mujoco")
-    on_bodies(1)
+    on_steps(1)
     maps: dict[str, dict[str, Array]] = {}
     if config.maps:
         for name, table in (("stiffness_damping", _scaled), ("size_strength", _sized)):
-            maps[name] = _map(config, *table(config), on_bodies)
+            maps[name] = _map(config, *table(config), on_steps)
     return Result(config, worth, body.n_springs, maps)
 
 
@@ -246,7 +246,7 @@ def _map(
     config: Config,
     shape: tuple[int, int],
     cells: list[tuple[BodySettings, float]],
-    on_bodies: Callable[[int], object],
+    on_steps: OnSteps,
 ) -> dict[str, Array]:
     rows = []
     for settings, strength in cells:
@@ -256,7 +256,7 @@ def _map(
             rows.append(worth.measures)
         except DivergenceError:
             rows.append(dict.fromkeys(MEASURES, np.nan))
-        on_bodies(1)
+        on_steps(1)
     return {
         m: np.array([row[m] for row in rows], dtype=np.float64).reshape(shape) for m in MEASURES
     }

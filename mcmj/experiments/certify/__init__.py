@@ -1,6 +1,7 @@
-"""Report card of a trained body: errors, Floquet multipliers, region of attraction, tolerances.
+"""A report card of a trained body.
 
-With no arguments: the general body, taught Van der Pol.
+Errors, Floquet multipliers, region of attraction, tolerances. With no arguments: the general
+body, taught Van der Pol.
 """
 
 GROUP = "analysis"

@@ -1,36 +1,25 @@
 """The command: certify."""
 
-from collections.abc import Sequence
-from pathlib import Path
-
 import numpy as np
+from matplotlib.figure import Figure
 from rich.console import Console
 from rich.table import Table
 
 from mcmj.analysis.stability.basin import Survey
 from mcmj.analysis.stability.phase import Diffusion
 from mcmj.analysis.stability.tolerance import Tolerance
-from mcmj.experiments.certify import figure as certplot
+from mcmj.experiments.base import Experiment
 from mcmj.experiments.certify.config import Config
+from mcmj.experiments.certify.figure import certificate_figure
 from mcmj.experiments.certify.run import STAGES, Result, run
-from mcmj.experiments.command_line import Output, main
-from mcmj.pictures import plotting
-from mcmj.utils import files
 from mcmj.utils.progress import progress_bar
+from mcmj.utils.validation import Array
 
 
-def work(config: Config, output: Output, out: Path) -> None:
-    with progress_bar("certifying", len(STAGES), quiet=output.quiet) as on_stages:
-        result = run(config, on_stages=on_stages)
-    plotting.save(figure(result), out / "certificate.png")
-    files.write_metrics(out / "metrics.json", "certify", config, config.noise_seed, result.metrics)
-    if not output.quiet:
-        show(result, out)
-
-
-def figure(result: Result):
+def figures(result: Result) -> dict[str, Figure]:
+    """The certificate."""
     config = result.config
-    return certplot.certificate_figure(
+    figure = certificate_figure(
         result.target,
         result.outputs,
         multipliers=result.floquet.multipliers,
@@ -50,9 +39,11 @@ def figure(result: Result):
         ],
         lines=lines(result),
     )
+    return {"certificate": figure}
 
 
-def levels(strengths: tuple[float, ...], survey: Survey):
+def levels(strengths: tuple[float, ...], survey: Survey) -> tuple[Array, Array, Array]:
+    """Strengths, and the shares that recovered and that blew up."""
     rows = (len(strengths), -1)
     return (
         np.array(strengths),
@@ -62,6 +53,7 @@ def levels(strengths: tuple[float, ...], survey: Survey):
 
 
 def lines(result: Result) -> list[tuple[str, str]]:
+    """The certificate in words and numbers."""
     floquet, wanted = result.floquet, result.target_multipliers
     times = result.starts.times[result.starts.recovered]
     agreeing, of = result.mujoco_agrees
@@ -91,23 +83,30 @@ def lines(result: Result) -> list[tuple[str, str]]:
 
 
 def over_copies(tolerance: Tolerance, unit: str) -> str:
+    """A median over copies with its interval."""
     low, high = tolerance.interval
     return f"{tolerance.median:.3g} ({low:.3g} .. {high:.3g}) {unit}"
 
 
 def plus_minus(diffusion: Diffusion) -> str:
+    """A jitter with its standard error."""
     return f"{diffusion.jitter:.1e} +- {100 * diffusion.jitter_error / diffusion.jitter:.0f} %"
 
 
-def show(result: Result, out: Path) -> None:
+def show(result: Result, console: Console) -> None:
+    """The result as tables."""
     table = Table("", "", title=f"certificate: {result.config.task}")
     for name, value in lines(result):
         table.add_row(name, value)
-    console = Console()
     console.print(table)
-    console.print(f"results in {out}")
 
 
-def command(arguments: Sequence[str] | None = None) -> None:
-    """Run it with the arguments of a command line."""
-    main("certify", Config, work, arguments)
+EXPERIMENT = Experiment(
+    name="certify",
+    config=Config,
+    run=run,
+    show=show,
+    bar=lambda config, quiet: progress_bar("certifying", len(STAGES), quiet=quiet),
+    seed=lambda config: config.noise_seed,
+    figures=figures,
+)

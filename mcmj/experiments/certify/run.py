@@ -111,7 +111,7 @@ class Result:
         }
 
 
-def run(config: Config, *, on_stages: OnSteps = lambda stages: None) -> Result:
+def run(config: Config, *, on_steps: OnSteps = lambda steps: None) -> Result:
     """Teach if need be, run in MuJoCo, and certify.
 
     Raises:
@@ -126,8 +126,8 @@ def run(config: Config, *, on_stages: OnSteps = lambda stages: None) -> Result:
                 f"the free run is off the orbit by {100 * errors['orbit_error']:.3g} % "
                 f"(threshold {100 * config.threshold:g} %): nothing to certify"
             )
-        on_stages(1)
-        return _certified(config, goal, loop, start, outputs, errors, on_stages)
+        on_steps(1)
+        return _certified(config, goal, loop, start, outputs, errors, on_steps)
 
 
 def _trained(config: Config, goal: Target) -> tuple[ClosedLoop, Array, Array, dict[str, float]]:
@@ -158,20 +158,20 @@ def _certified(
     start: Array,
     outputs: Array,
     errors: dict[str, float],
-    on_stages: OnSteps,
+    on_steps: OnSteps,
 ) -> Result:
     seed, copies = config.noise_seed, config.copies
     how: dict[str, Any] = {"threshold": config.threshold, "recovery": config.recovery, "seed": seed}
     cycle = _cycle(config, goal, loop, start)
     analysis = floquet(loop, cycle)
     confirmed = monodromy_error(loop, cycle, analysis)
-    on_stages(1)
+    on_steps(1)
     exponent = lyapunov_exponent(
         loop, cycle.state, interval=cycle.period, scale=cycle.scale, seed=seed
     )
-    on_stages(1)
+    on_steps(1)
     diffusion = phase_diffusion(loop, cycle, config.diffusion_noise, seed=seed)
-    on_stages(1)
+    on_steps(1)
     begun = scaled_starts(
         loop, goal, np.repeat(config.scales, config.phases),
         np.tile(np.arange(config.phases) / config.phases, len(config.scales)),
@@ -180,19 +180,19 @@ def _certified(
     starts = _survey(config, loop, goal, begun)
     rest = loop.vector(rest_state(loop.body))[None]
     rest_recovers = bool(_survey(config, loop, goal, rest).recovered[0])
-    on_stages(1)
+    on_steps(1)
     generator = stream(seed, "initial_state")
     hit = kicked(loop, cycle, np.repeat(config.kicks, copies), generator)
     kicks = _survey(config, loop, goal, pushed(loop, hit, None, 1.0, refine=config.refine))
-    on_stages(1)
+    on_steps(1)
     pushes, agrees = _pushes(config, goal, loop, cycle)
-    on_stages(1)
+    on_steps(1)
     states = on_cycle(loop, cycle, copies)
     force = force_tolerance(loop, goal, states, **how)
     fine = force_tolerance(loop, goal, states, refine=config.refine, **how)
-    on_stages(1)
+    on_steps(1)
     noise = noise_tolerance(loop, goal, states, **how)
-    on_stages(1)
+    on_steps(1)
     return Result(
         config, loop.body, goal, cycle, errors, outputs, analysis,
         None if goal.rhs is None else target_multipliers(goal), confirmed, exponent, diffusion,

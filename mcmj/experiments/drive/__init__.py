@@ -1,3 +1,6 @@
-"""The cross-entropy method learns to drive a body by its input channel, as a dm_control task."""
+"""Drive a body by its input, as a dm_control task.
+
+The cross-entropy method learns it.
+"""
 
 GROUP = "robots"

@@ -1,43 +1,53 @@
 """The command: drive."""
 
-from collections.abc import Sequence
 from pathlib import Path
 
+from matplotlib.figure import Figure
 from rich.console import Console
 
-from mcmj.experiments.command_line import Output, main
+from mcmj.experiments.base import Experiment
 from mcmj.experiments.drive.figure import drive_figure
-from mcmj.experiments.drive.run import Config, Episode, run, total_episodes
-from mcmj.pictures.plotting import save
+from mcmj.experiments.drive.run import Config, Episode, Result, run, total_episodes
 from mcmj.utils import files
 from mcmj.utils.progress import progress_bar
 
 
-def work(config: Config, output: Output, out: Path) -> None:
-    with progress_bar("learning", total_episodes(config), quiet=output.quiet) as on_episodes:
-        result = run(config, on_episodes=on_episodes)
-    before, after = (
-        (e.times, e.inputs, e.outputs, e.mean_reward) for e in (result.before, result.after)
-    )
-    save(drive_figure(result.target, result.rewards, before, after), out / "drive.png")
+def write(result: Result, folder: Path) -> None:
+    """Both episodes."""
     episodes = {"before": result.before, "after": result.after}
     arrays = {
         f"{name}/{field}": getattr(episode, field)
         for name, episode in episodes.items()
         for field in Episode.__dataclass_fields__
     }
-    files.write_arrays(out / "episodes.npz", arrays, config, config.seed)
-    files.write_metrics(out / "metrics.json", "drive", config, config.seed, result.metrics)
-    if not output.quiet:
-        metrics = result.metrics
-        Console().print(
-            f"mean reward {metrics['mean_reward_without_input']:.3f} without input, "
-            f"{metrics['mean_reward_learned']:.3f} after {metrics['episodes']} episodes; "
-            f"orbit error of the last period {100 * result.errors[0]:.1f} % and "
-            f"{100 * result.errors[1]:.1f} %; in {out}"
-        )
+    files.write_arrays(folder / "episodes.npz", arrays, result.config, result.config.seed)
 
 
-def command(arguments: Sequence[str] | None = None) -> None:
-    """Run it with the arguments of a command line."""
-    main("drive", Config, work, arguments)
+def figures(result: Result) -> dict[str, Figure]:
+    """The rewards, and the outputs before and after."""
+    before, after = (
+        (e.times, e.inputs, e.outputs, e.mean_reward) for e in (result.before, result.after)
+    )
+    return {"drive": drive_figure(result.target, result.rewards, before, after)}
+
+
+def show(result: Result, console: Console) -> None:
+    """What was learned, in a sentence."""
+    metrics = result.metrics
+    console.print(
+        f"mean reward {metrics['mean_reward_without_input']:.3f} without input, "
+        f"{metrics['mean_reward_learned']:.3f} after {metrics['episodes']} episodes; "
+        f"orbit error of the last period {100 * result.errors[0]:.1f} % and "
+        f"{100 * result.errors[1]:.1f} %"
+    )
+
+
+EXPERIMENT = Experiment(
+    name="drive",
+    config=Config,
+    run=run,
+    show=show,
+    bar=lambda config, quiet: progress_bar("learning", total_episodes(config), quiet=quiet),
+    write=write,
+    figures=figures,
+)

@@ -131,11 +131,11 @@ class Result:
         }
 
 
-def run(config: Config, *, on_episodes: OnSteps = lambda episodes: None) -> Result:
+def run(config: Config, *, on_steps: OnSteps = lambda steps: None) -> Result:
     """Teach the body, then let the cross-entropy method learn to drive it.
 
     Args:
-        on_episodes: called with 1 after every episode, for progress bars.
+        on_steps: called with 1 after every episode, for progress bars.
 
     Raises:
         DivergenceError: the body blew up under the teacher.
@@ -153,7 +153,7 @@ def run(config: Config, *, on_episodes: OnSteps = lambda episodes: None) -> Resu
 
     def play(knots: Array) -> Episode:
         episode = _play(environment, _signal(config, knots))
-        on_episodes(1)
+        on_steps(1)
         return episode
 
     before = play(np.zeros(config.knots))

@@ -1,3 +1,6 @@
-"""A nonlinear spring becomes another system by static feedback: error and order by integrator."""
+"""A nonlinear spring becomes another system by feedback.
+
+Error and order of the static feedback, by integrator and step.
+"""
 
 GROUP = "analysis"

@@ -1,30 +1,23 @@
 """The command: emulate."""
 
-from collections.abc import Sequence
-from pathlib import Path
-
+from matplotlib.figure import Figure
 from rich.console import Console
 from rich.table import Table
 
-from mcmj.experiments.command_line import Output, main
+from mcmj.experiments.base import Experiment
 from mcmj.experiments.emulate.figure import emulation_figure
 from mcmj.experiments.emulate.run import REPORTED, Config, Result, run
-from mcmj.pictures.plotting import save
-from mcmj.utils import files
 from mcmj.utils.progress import progress_bar
 
 
-def work(config: Config, output: Output, out: Path) -> None:
-    with progress_bar("targets", len(config.names), quiet=output.quiet) as on_targets:
-        result = run(config, on_targets=on_targets)
+def figures(result: Result) -> dict[str, Figure]:
+    """Orbits, and error against step."""
     figure = emulation_figure(result.orbits, result.cells, result.slopes, result.mismatch_errors)
-    save(figure, out / "emulate.png")
-    files.write_metrics(out / "metrics.json", "emulate", config, config.seed, result.metrics)
-    if not output.quiet:
-        show(result, out)
+    return {"emulate": figure}
 
 
-def show(result: Result, out: Path) -> None:
+def show(result: Result, console: Console) -> None:
+    """The result as tables."""
     config = result.config
     table = Table(title=f"error of the emulation at {REPORTED:g} ms, {config.horizon:g} s (order)")
     table.add_column("target")
@@ -47,9 +40,13 @@ def show(result: Result, out: Path) -> None:
         )
     for size, error in result.mismatch_errors.items():
         console.print(f"van_der_pol, {size:g} of p and q unknown to K: {error:.1e}")
-    console.print(f"results in {out}")
 
 
-def command(arguments: Sequence[str] | None = None) -> None:
-    """Run it with the arguments of a command line."""
-    main("emulate", Config, work, arguments)
+EXPERIMENT = Experiment(
+    name="emulate",
+    config=Config,
+    run=run,
+    show=show,
+    bar=lambda config, quiet: progress_bar("targets", len(config.names), quiet=quiet),
+    figures=figures,
+)

@@ -10,7 +10,6 @@ and, above all, how well K knows p and q.
 """
 
 import warnings
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -28,6 +27,7 @@ from mcmj.utils.errors import (
     StabilityWarning,
     UnknownNameError,
 )
+from mcmj.utils.progress import OnSteps
 from mcmj.utils.validation import (
     SHORTEST_STEP,
     Array,
@@ -145,7 +145,7 @@ class Result:
         return table
 
 
-def run(config: Config, *, on_targets: Callable[[int], object] = lambda targets: None) -> Result:
+def run(config: Config, *, on_steps: OnSteps = lambda steps: None) -> Result:
     """Emulate every target under every integrator and step."""
     systems = {name: system(name) for name in config.targets}
     if config.g is not None:
@@ -155,7 +155,7 @@ def run(config: Config, *, on_targets: Callable[[int], object] = lambda targets:
         cells[name] = _cells(config, one)
         states = emulate(one, config.integrators[-1], REPORTED, config.horizon)
         orbits[name] = (states, reference(one, REPORTED, config.horizon))
-        on_targets(1)
+        on_steps(1)
     driven = systems.get("driven_duffing")
     return Result(
         config,

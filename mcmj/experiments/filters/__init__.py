@@ -1,3 +1,6 @@
-"""Open-loop filters against regression without a body, and a switch that needs feedback."""
+"""Filters without feedback, and a switch that needs it.
+
+The body against regression on the input without a body.
+"""
 
 GROUP = "the paper"

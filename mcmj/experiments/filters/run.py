@@ -6,7 +6,6 @@ moment, and with delays. What the body does better than the second is nonlinear;
 better than the first is that, or memory (a plain delay is no feat beside the second).
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from mcmj.core.random_body import BodySettings, draw_body
@@ -25,6 +24,7 @@ from mcmj.targets.filter_tasks import (
     volterra,
 )
 from mcmj.utils.errors import InvalidArgumentError, UnknownNameError
+from mcmj.utils.progress import OnSteps
 from mcmj.utils.seeds import stream
 from mcmj.utils.validation import (
     Array,
@@ -145,7 +145,7 @@ class Result:
         return table
 
 
-def run(config: Config, *, on_tasks: Callable[[int], object] = lambda tasks: None) -> Result:
+def run(config: Config, *, on_steps: OnSteps = lambda steps: None) -> Result:
     """Run every task; the filters by one body."""
     filters: dict[str, FilterResult] = {}
     symbols: Array | None = None  # states under the input that two tasks share
@@ -158,11 +158,11 @@ def run(config: Config, *, on_tasks: Callable[[int], object] = lambda tasks: Non
             filters[name] = fit_filter(config, task, symbols)
         else:
             filters[name] = fit_filter(config, task, drive(config, task))
-        on_tasks(1)
+        on_steps(1)
     switch = None
     if "switch" in config.tasks:
         switch = run_switch(config.switch, config.seed, engine=config.engine)
-        on_tasks(1)
+        on_steps(1)
     return Result(config, filters, switch)
 
 

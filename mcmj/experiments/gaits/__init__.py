@@ -1,7 +1,7 @@
-"""Figs. 8 and 9: one body walks, trots, paces and bounds; its readout is switched, not its body.
+"""Figs. 8 and 9: one body walks, trots, paces and bounds.
 
-With no arguments: the body that comes with mcmj, with its four readouts. With --seeds n: how
-many random bodies do it.
+Its readout is switched, not its body. With no arguments: the body that comes with mcmj, with
+its four readouts. With --seeds n: how many random bodies do it.
 """
 
 GROUP = "the paper"

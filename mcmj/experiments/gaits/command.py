@@ -1,33 +1,24 @@
 """The command: gaits."""
 
-from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
+from matplotlib.figure import Figure
 from rich.console import Console
 from rich.table import Table
 
-from mcmj.experiments.command_line import Output, main
+from mcmj.experiments.base import Experiment
 from mcmj.experiments.gaits.config import Config, total_steps
 from mcmj.experiments.gaits.figure import gait_diagram, switch_figure
 from mcmj.experiments.gaits.result import Result
 from mcmj.experiments.gaits.run import run
 from mcmj.mjcf.write import to_mjcf
-from mcmj.pictures.plotting import save
 from mcmj.utils import files
 from mcmj.utils.progress import progress_bar
 
 
-def work(config: Config, output: Output, out: Path) -> None:
-    with progress_bar("teaching, switching", total_steps(config), quiet=output.quiet) as on_steps:
-        result = run(config, on_steps=on_steps)
-    write(result, out)
-    if not output.quiet:
-        show(result, out)
-
-
 def write(result: Result, out: Path) -> None:
-    """metrics.json, body.xml with all readouts, trajectory.npz and the figures."""
+    """body.xml with all readouts, and the first body's runs."""
     config, first = result.config, result.first
     readouts = result.readouts
     xml = to_mjcf(
@@ -45,13 +36,12 @@ def write(result: Result, out: Path) -> None:
     for (start, end), switch in first.switches.items():
         arrays[f"{start}_to_{end}/outputs"] = switch.outputs
     files.write_arrays(out / "trajectory.npz", arrays, config, config.first_seed)
-    draw(result, out)
-    files.write_metrics(out / "metrics.json", "gaits", config, config.first_seed, result.metrics)
 
 
-def draw(result: Result, out: Path) -> None:
+def figures(result: Result) -> dict[str, Figure]:
     """The switches from the first gait in the manner of Fig. 9; the gait diagram."""
     config, first = result.config, result.first
+    found = {}
     switches = {
         f"{start} to {end}": (
             first.gaits[start].target, first.gaits[end].target,
@@ -61,17 +51,19 @@ def draw(result: Result, out: Path) -> None:
         if start == config.gaits[0] and len(switch.outputs)
     }  # fmt: skip
     if switches:
-        save(switch_figure(switches, config.timestep), out / "gaits.png")
+        found["gaits"] = switch_figure(switches, config.timestep)
     gaits = {
         f"{name}, period {gait.target.period:.2f} s": (gait.target, gait.free.outputs)
         for name, gait in first.gaits.items()
         if len(gait.free.outputs)
     }
     if gaits:
-        save(gait_diagram(gaits, switches, config.timestep), out / "gait_diagram.png")
+        found["gait_diagram"] = gait_diagram(gaits, switches, config.timestep)
+    return found
 
 
-def show(result: Result, out: Path) -> None:
+def show(result: Result, console: Console) -> None:
+    """The result as tables."""
     config, first = result.config, result.first
     table = Table(title=f"last {config.window:g} s of {config.free_run:g} s in closed loop")
     columns = ("orbit error", "period error", "phase lag error", "duty factor", "from rest after")
@@ -99,7 +91,6 @@ def show(result: Result, out: Path) -> None:
             error = "" if run is None else f"{100 * run.errors['orbit_error']:.3f} %"
             cells.append(error if run is None else f"{error} ({run.time:.1f} s)")
         switches.add_row(start, *cells)
-    console = Console()
     console.print(table)
     if first.switches:
         console.print(switches)
@@ -109,9 +100,15 @@ def show(result: Result, out: Path) -> None:
         for kind, label in labels.items():
             good = sum(bool(one[kind]) for one in result.outcomes)
             console.print(f"{good} of {config.seeds} bodies {label}")
-    console.print(f"results in {out}")
 
 
-def command(arguments: Sequence[str] | None = None) -> None:
-    """Run it with the arguments of a command line."""
-    main("gaits", Config, work, arguments)
+EXPERIMENT = Experiment(
+    name="gaits",
+    config=Config,
+    run=run,
+    show=show,
+    bar=lambda config, quiet: progress_bar("teaching, switching", total_steps(config), quiet=quiet),
+    seed=lambda config: config.first_seed,
+    write=write,
+    figures=figures,
+)

@@ -1,6 +1,6 @@
-"""Guided search for settings of any experiment (Optuna), judged on bodies it has not seen.
+"""Guided search for settings of any experiment (Optuna).
 
-Killed at any moment, the same command goes on.
+Judged on bodies that it has not seen. Killed at any moment, the same command goes on.
 """
 
 GROUP = "search"

@@ -1,26 +1,27 @@
 """The command: guided."""
 
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from matplotlib.figure import Figure
 from rich.console import Console
 from rich.table import Table
 
-from mcmj.experiments.command_line import Output, main
-from mcmj.experiments.guided.run import Config, Result, run
+from mcmj.experiments.base import Experiment
+from mcmj.experiments.guided.run import Config, OnSetting, Result, run
 from mcmj.experiments.search.figure import guided_figure
-from mcmj.pictures.plotting import save
-from mcmj.utils import files
 from mcmj.utils.progress import trial_bar
 from mcmj.utils.success_rates import rate_cells
 
 
-def work(config: Config, output: Output, out: Path) -> None:
-    with trial_bar(
-        "settings", config.settings, maximise=config.large_is_good, quiet=output.quiet
-    ) as on_setting:
-        result = run(config, folder=out, on_setting=on_setting)
+def resume(config: Config, folder: Path, on_steps: OnSetting) -> Result:
+    """The search, its store in the folder."""
+    return run(config, folder=folder, on_setting=on_steps)
+
+
+def figures(result: Result) -> dict[str, Figure]:
+    """What was tried, and how the best does on other bodies."""
+    config = result.config
     figure = guided_figure(
         [objective for _, objective in result.tried],
         result.judged,
@@ -28,14 +29,11 @@ def work(config: Config, output: Output, out: Path) -> None:
         names=(config.objective, config.target.name),
         maximise=(config.large_is_good, config.maximise),
     )
-    save(figure, out / "guided.png")
-    files.write_metrics(out / "metrics.json", "guided", config, config.first_seed, result.metrics)
-    if not output.quiet:
-        show(result, out)
+    return {"guided": figure}
 
 
-def show(result: Result, out: Path) -> None:
-    console = Console()
+def show(result: Result, console: Console) -> None:
+    """The result as tables."""
     metrics: dict[str, Any] = result.metrics
     table = Table(title=f"{result.config.judged} bodies that the search has not seen")
     for column in ("settings", "successes", "95 % interval", "median score", "objective"):
@@ -52,9 +50,18 @@ def show(result: Result, out: Path) -> None:
             f"guided, in MuJoCo: {metrics['confirmed']} bodies, the same verdict in "
             f"{100 * metrics['twin_mujoco_agreement']:.1f} %"
         )
-    console.print(f"results in {out}")
 
 
-def command(arguments: Sequence[str] | None = None) -> None:
-    """Run it with the arguments of a command line."""
-    main("guided", Config, work, arguments)
+EXPERIMENT = Experiment(
+    name="guided",
+    config=Config,
+    run=resume,
+    show=show,
+    bar=lambda config, quiet: trial_bar(
+        "settings", config.settings, maximise=config.large_is_good, quiet=quiet
+    ),
+    seed=lambda config: config.first_seed,
+    figures=figures,
+    needs_folder=True,
+    resumes=True,
+)

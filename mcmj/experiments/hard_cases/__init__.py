@@ -1,3 +1,6 @@
-"""The largest stable step of every integrator on the hard cases: bisected, and predicted."""
+"""The largest stable step of every integrator.
+
+On the hard cases, bisected, beside its prediction.
+"""
 
 GROUP = "speed and accuracy"

@@ -2,29 +2,27 @@
 
 import csv
 import io
-from collections.abc import Sequence
 from pathlib import Path
 
+from matplotlib.figure import Figure
 from rich.console import Console
 from rich.table import Table
 
-from mcmj.experiments.command_line import Output, main
+from mcmj.experiments.base import Experiment
 from mcmj.experiments.hard_cases.figure import step_figure
 from mcmj.experiments.hard_cases.run import LONGEST, STEPS, Config, Result, Row, run
-from mcmj.pictures.plotting import save
 from mcmj.utils import files
 from mcmj.utils.progress import progress_bar
 
 
-def work(config: Config, output: Output, out: Path) -> None:
-    total = len(config.cases) * len(config.integrators)
-    with progress_bar("cases", total, quiet=output.quiet) as on_rows:
-        result = run(config, on_rows=on_rows)
-    save(step_figure(result.steps), out / "hard_cases.png")
-    files.write_text(out / "hard_cases.csv", to_csv(result))
-    files.write_metrics(out / "metrics.json", "hard_cases", config, config.seed, result.metrics)
-    if not output.quiet:
-        show(result, out)
+def write(result: Result, folder: Path) -> None:
+    """All steps as a table."""
+    files.write_text(folder / "hard_cases.csv", to_csv(result))
+
+
+def figures(result: Result) -> dict[str, Figure]:
+    """The largest stable steps."""
+    return {"hard_cases": step_figure(result.steps)}
 
 
 def to_csv(result: Result) -> str:
@@ -38,7 +36,8 @@ def to_csv(result: Result) -> str:
     return text.getvalue()
 
 
-def show(result: Result, out: Path) -> None:
+def show(result: Result, console: Console) -> None:
+    """The result as tables."""
     table = Table(
         title="largest stable step, ms: measured; predicted safe .. blow-up", show_lines=True
     )
@@ -48,12 +47,11 @@ def show(result: Result, out: Path) -> None:
     rows = {(row.case, row.integrator): row for row in result.rows}
     for case in result.config.cases:
         table.add_row(case, *(cell(rows[case, name]) for name in result.config.integrators))
-    console = Console()
     console.print(table)
-    console.print(f"results in {out}")
 
 
 def cell(row: Row) -> str:
+    """Measured; predicted safe and blow-up [ms]."""
     measured, _, safe, blow_up = (milliseconds(getattr(row, name)) for name in STEPS)
     return f"{measured}\n{safe} .. {blow_up}"
 
@@ -64,6 +62,14 @@ def milliseconds(step: float) -> str:
     return "any" if step > LONGEST else f"{ms:.0f}" if ms >= 10 else f"{ms:.2g}"
 
 
-def command(arguments: Sequence[str] | None = None) -> None:
-    """Run it with the arguments of a command line."""
-    main("hard_cases", Config, work, arguments)
+EXPERIMENT = Experiment(
+    name="hard_cases",
+    config=Config,
+    run=run,
+    show=show,
+    bar=lambda config, quiet: progress_bar(
+        "cases", len(config.cases) * len(config.integrators), quiet=quiet
+    ),
+    write=write,
+    figures=figures,
+)

@@ -127,7 +127,7 @@ class Result:
         return table
 
 
-def run(config: Config, *, on_rows: OnSteps = lambda rows: None) -> Result:
+def run(config: Config, *, on_steps: OnSteps = lambda steps: None) -> Result:
     """Bisect and predict every case under every integrator."""
     rows, amplitudes = [], {}
     for name in config.cases:
@@ -136,7 +136,7 @@ def run(config: Config, *, on_rows: OnSteps = lambda rows: None) -> Result:
         amplitudes[name] = (float(x1.max()), float(x2.max()))
         for integrator in config.integrators:
             rows.append(_row(config, name, case, integrator, x1, x2))
-            on_rows(1)
+            on_steps(1)
     return Result(config, tuple(rows), amplitudes)
 
 

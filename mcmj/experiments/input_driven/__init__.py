@@ -1,3 +1,6 @@
-"""Figs. 10 and 11: the input chooses a body's rhythm. With --seeds n: how many bodies learn it."""
+"""Figs. 10 and 11: an input chooses the rhythm of a body.
+
+With --seeds n: how many bodies learn it.
+"""
 
 GROUP = "the paper"

@@ -1,6 +1,5 @@
 """The command: input_driven."""
 
-from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -8,30 +7,29 @@ from matplotlib.figure import Figure
 from rich.console import Console
 from rich.table import Table
 
-from mcmj.experiments.command_line import Output, main
+from mcmj.experiments.base import Experiment
 from mcmj.experiments.input_driven.config import Config, total_steps
 from mcmj.experiments.input_driven.figure import input_curves_figure, jumps_figure
 from mcmj.experiments.input_driven.run import Result, run
 from mcmj.mjcf.write import to_mjcf
-from mcmj.pictures.plotting import save
 from mcmj.utils import files
 from mcmj.utils.progress import progress_bar
 
 
-def work(config: Config, output: Output, out: Path) -> None:
-    with progress_bar("teaching, running", total_steps(config), quiet=output.quiet) as on_steps:
-        result = run(config, on_steps=on_steps)
-    first = result.first
-    files.write_text(out / "body.xml", body_file(result))
-    save(curves(result), out / "input_curves.png")
-    jumps = {u: first.held[u] for u in config.inputs}
-    runs = {u: (h.target, h.outputs, h.orbit_error) for u, h in jumps.items()}
-    save(jumps_figure(runs, config.timestep, config.course.last), out / "input_jumps.png")
-    arrays = {f"eps_{u:g}/outputs": held.outputs for u, held in first.held.items()}
-    files.write_arrays(out / "trajectory.npz", arrays, config, config.seed)
-    files.write_metrics(out / "metrics.json", "input_driven", config, config.seed, result.metrics)
-    if not output.quiet:
-        show(result, out)
+def write(result: Result, folder: Path) -> None:
+    """body.xml with all readouts, and the first body's runs."""
+    config = result.config
+    files.write_text(folder / "body.xml", body_file(result))
+    arrays = {f"eps_{u:g}/outputs": held.outputs for u, held in result.first.held.items()}
+    files.write_arrays(folder / "trajectory.npz", arrays, config, config.seed)
+
+
+def figures(result: Result) -> dict[str, Figure]:
+    """Figs. 10 and 11."""
+    config, held = result.config, result.first.held
+    runs = {u: (held[u].target, held[u].outputs, held[u].orbit_error) for u in config.inputs}
+    jumps = jumps_figure(runs, config.timestep, config.course.last)
+    return {"input_curves": curves(result), "input_jumps": jumps}
 
 
 def body_file(result: Result) -> str:
@@ -60,7 +58,8 @@ def curves(result: Result) -> Figure:
     return input_curves_figure((inputs, *target), (inputs, *held), sweep, first.start.taught)
 
 
-def show(result: Result, out: Path) -> None:
+def show(result: Result, console: Console) -> None:
+    """The result as tables."""
     config, first = result.config, result.first
     table = Table(title=f"last {config.window:g} s of {config.free_run:g} s at constant input")
     for column in ("input", "orbit error", "amplitude error", "frequency error"):
@@ -68,7 +67,6 @@ def show(result: Result, out: Path) -> None:
     for u, held in first.held.items():
         errors = (held.orbit_error, held.amplitude_error, held.frequency_error)
         table.add_row(f"{u:g}", *(f"{100 * error:.2f} %" for error in errors))
-    console = Console()
     console.print(table)
     if first.sweep:
         found = first.sweep.differences(min(config.inputs))
@@ -81,9 +79,14 @@ def show(result: Result, out: Path) -> None:
     if config.seeds > 1:
         for name, row in result.rates.items():
             console.print(f"input {name}: {row['successes']} of {row['of']} bodies")
-    console.print(f"results in {out}")
 
 
-def command(arguments: Sequence[str] | None = None) -> None:
-    """Run it with the arguments of a command line."""
-    main("input_driven", Config, work, arguments)
+EXPERIMENT = Experiment(
+    name="input_driven",
+    config=Config,
+    run=run,
+    show=show,
+    bar=lambda config, quiet: progress_bar("teaching, running", total_steps(config), quiet=quiet),
+    write=write,
+    figures=figures,
+)

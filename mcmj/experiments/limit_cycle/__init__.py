@@ -1,4 +1,4 @@
-"""Fig. 5: teach a body a limit cycle and let it run free in MuJoCo.
+"""Fig. 5: a body learns a limit cycle and runs free.
 
 With no arguments: the general body and all three tasks of the paper.
 """

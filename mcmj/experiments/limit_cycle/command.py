@@ -1,14 +1,13 @@
 """The command: limit_cycle."""
 
-import sys
-from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
+from matplotlib.figure import Figure
 from rich.console import Console
 from rich.table import Table
 
-from mcmj.experiments.command_line import Output, main
+from mcmj.experiments.base import Experiment
 from mcmj.experiments.limit_cycle.config import Config, total_steps
 from mcmj.experiments.limit_cycle.run import Result, run
 from mcmj.mjcf.write import to_mjcf
@@ -18,24 +17,8 @@ from mcmj.utils import files
 from mcmj.utils.progress import progress_bar
 
 
-def work(config: Config, output: Output, out: Path) -> None:
-    with progress_bar("teaching and running", total_steps(config), quiet=output.quiet) as on_steps:
-        try:
-            result = run(config, folder=out, on_steps=on_steps)
-        except KeyboardInterrupt:
-            print("limit_cycle: the same command goes on from the last chunk", file=sys.stderr)
-            raise
-    write(result, out)
-    for checkpoint in result.checkpoints.values():
-        checkpoint.remove()
-    if output.video:
-        write_videos(result, out)
-    if not output.quiet:
-        show(result, out)
-
-
 def write(result: Result, out: Path) -> None:
-    """metrics.json, body.xml with all readouts, trajectory.npz and the figure."""
+    """body.xml with all readouts, and the free runs."""
     config, tasks = result.config, result.tasks
     readouts = result.readouts
     xml = to_mjcf(
@@ -51,16 +34,17 @@ def write(result: Result, out: Path) -> None:
     for name, task in tasks.items():
         arrays[f"{name}/start_time"], arrays[f"{name}/outputs"] = task.times[0], task.outputs
     files.write_arrays(out / "trajectory.npz", arrays, config, config.noise_seed)
+
+
+def figures(result: Result) -> dict[str, Figure]:
+    """Fig. 5."""
     figure = plotting.limit_cycle_figure(
         result.body,
-        [(task.target, task.times, task.outputs, task.errors) for task in tasks.values()],
-        free_run=config.free_run,
-        window=config.window,
+        [(task.target, task.times, task.outputs, task.errors) for task in result.tasks.values()],
+        free_run=result.config.free_run,
+        window=result.config.window,
     )
-    plotting.save(figure, out / "limit_cycle.png")
-    files.write_metrics(
-        out / "metrics.json", "limit_cycle", config, config.noise_seed, result.metrics
-    )
+    return {"limit_cycle": figure}
 
 
 def write_videos(result: Result, out: Path) -> None:
@@ -79,8 +63,8 @@ def write_videos(result: Result, out: Path) -> None:
         )
 
 
-def show(result: Result, out: Path) -> None:
-    """The errors as a table."""
+def show(result: Result, console: Console) -> None:
+    """The result as tables."""
     config = result.config
     table = Table(title=f"last {config.window:g} s of {config.free_run:g} s in closed loop")
     for column in ("task", "orbit error", "period error", "amplitude error", "training NRMSE"):
@@ -94,16 +78,26 @@ def show(result: Result, out: Path) -> None:
             f"{100 * errors['amplitude_error']:.3f} %",
             f"{task.fit.train_nrmse:.2e}" if task.fit else "not taught",
         )
-    console = Console()
     console.print(table)
     if result.steps_per_second is not None:
         console.print(
             f"{result.body!r}: {result.steps_per_second:,.0f} steps a second in closed loop, "
             f"{result.closed_loop_cost_ratio:.2f} x a bare mj_step loop"
         )
-    console.print(f"results in {out}")
 
 
-def command(arguments: Sequence[str] | None = None) -> None:
-    """Run it with the arguments of a command line."""
-    main("limit_cycle", Config, work, arguments)
+EXPERIMENT = Experiment(
+    name="limit_cycle",
+    config=Config,
+    run=run,
+    show=show,
+    bar=lambda config, quiet: progress_bar(
+        "teaching and running", total_steps(config), quiet=quiet
+    ),
+    seed=lambda config: config.noise_seed,
+    write=write,
+    figures=figures,
+    film=write_videos,
+    needs_folder=True,
+    resumes=True,
+)

@@ -1,3 +1,6 @@
-"""Feedback linearisability by Lie brackets, and why arrays of linear springs need diversity."""
+"""Feedback linearisability, and why springs must differ.
+
+Lie brackets in closed form; arrays of linear springs from diverse to equal.
+"""
 
 GROUP = "analysis"

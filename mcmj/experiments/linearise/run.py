@@ -6,7 +6,6 @@ memory: a linear readout of the lengths filters the input with a Gaussian kernel
 Equal springs all say the same, and one spring is no memory to choose from.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,6 +17,7 @@ from mcmj.learning.regression import fit_readout
 from mcmj.metrics import orbits
 from mcmj.simulation.simulation import Simulation
 from mcmj.targets.filter_tasks import gaussian_kernel, smooth_noise
+from mcmj.utils.progress import OnSteps
 from mcmj.utils.seeds import stream
 from mcmj.utils.validation import (
     Array,
@@ -120,7 +120,7 @@ class Result:
         }  # fmt: skip
 
 
-def run(config: Config, *, on_arrays: Callable[[int], object] = lambda arrays: None) -> Result:
+def run(config: Config, *, on_steps: OnSteps = lambda steps: None) -> Result:
     """Examine springs and arrays, then run the arrays as filters."""
     matrices = {
         n: [
@@ -136,7 +136,7 @@ def run(config: Config, *, on_arrays: Callable[[int], object] = lambda arrays: N
         errors[n] = []
         for spread in config.spreads:
             errors[n].append(_filter_error(config, n, spread, inputs, wanted))
-            on_arrays(1)
+            on_steps(1)
     return Result(
         config,
         reports(config.symbolic_masses),

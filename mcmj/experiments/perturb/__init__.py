@@ -1,3 +1,6 @@
-"""Fig. 6: disturb a taught rhythm in four ways and watch it come back; noise tolerance."""
+"""Fig. 6: a taught rhythm is disturbed and comes back.
+
+Four disturbances, and the tolerance of noise.
+"""
 
 GROUP = "the paper"

@@ -1,3 +1,6 @@
-"""Which springs must be sensed: closed-loop error against the number of springs read."""
+"""Which springs must be sensed.
+
+Closed-loop error against the number of springs that the readout hears.
+"""
 
 GROUP = "analysis"

@@ -1,24 +1,30 @@
 """The command: prune."""
 
-from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
+from matplotlib.figure import Figure
 from rich.console import Console
 from rich.table import Table
 
-from mcmj.experiments.command_line import Output, main
+from mcmj.experiments.base import Experiment
 from mcmj.experiments.prune.run import Config, Result, run, total_runs
 from mcmj.experiments.search.figure import pruning_figure
-from mcmj.pictures.plotting import save
 from mcmj.utils import files
 from mcmj.utils.progress import progress_bar
 
 
-def work(config: Config, output: Output, out: Path) -> None:
-    with progress_bar("free runs", total_runs(config), quiet=output.quiet) as on_runs:
-        result = run(config, on_runs=on_runs)
-    first = result.bodies[0]
+def write(result: Result, folder: Path) -> None:
+    """Errors, and the order in which springs are left out."""
+    config, first = result.config, result.bodies[0]
+    arrays = {f"{m}/errors": result.errors(m) for m in config.methods}
+    arrays |= {f"{m}/order": first.orders[m] for m in config.methods}
+    files.write_arrays(folder / "prune.npz", arrays, config, config.of_seed(0).noise_seed)
+
+
+def figures(result: Result) -> dict[str, Figure]:
+    """Errors against springs sensed."""
+    config, first = result.config, result.bodies[0]
     method = config.methods[0]
     figure = pruning_figure(
         config.counts,
@@ -28,17 +34,11 @@ def work(config: Config, output: Output, out: Path) -> None:
         body=first.body,
         sensed=first.orders[method][: result.needed(method, 0) or 0],
     )
-    save(figure, out / "prune.png")
-    seed = config.of_seed(0).noise_seed
-    arrays = {f"{m}/errors": result.errors(m) for m in config.methods}
-    arrays |= {f"{m}/order": first.orders[m] for m in config.methods}
-    files.write_arrays(out / "prune.npz", arrays, config, seed)
-    files.write_metrics(out / "metrics.json", "prune", config, seed, result.metrics)
-    if not output.quiet:
-        show(result, out)
+    return {"prune": figure}
 
 
-def show(result: Result, out: Path) -> None:
+def show(result: Result, console: Console) -> None:
+    """The result as tables."""
     config = result.config
     table = Table(title=f"orbit error below {100 * config.threshold:g} %, {config.seeds} bodies")
     table.add_column("springs sensed", justify="right")
@@ -52,16 +52,21 @@ def show(result: Result, out: Path) -> None:
             good = int((errors < config.threshold).sum())
             cells += [f"{good} of {len(errors)}", f"{100 * np.median(errors):.3g} %"]
         table.add_row(*cells)
-    console = Console()
     console.print(table)
     full = np.array([body.full_error for body in result.bodies])
     console.print(
         f"all springs: {int((full < config.threshold).sum())} of {len(full)}, "
         f"median error {100 * np.median(full):.3g} %"
     )
-    console.print(f"results in {out}")
 
 
-def command(arguments: Sequence[str] | None = None) -> None:
-    """Run it with the arguments of a command line."""
-    main("prune", Config, work, arguments)
+EXPERIMENT = Experiment(
+    name="prune",
+    config=Config,
+    run=run,
+    show=show,
+    bar=lambda config, quiet: progress_bar("free runs", total_runs(config), quiet=quiet),
+    seed=lambda config: config.of_seed(0).noise_seed,
+    write=write,
+    figures=figures,
+)

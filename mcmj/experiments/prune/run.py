@@ -1,6 +1,5 @@
 """Which springs must be sensed? Readouts of fewer and fewer springs, run in closed loop."""
 
-from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -15,9 +14,8 @@ from mcmj.learning.teaching import Course, lessons_of
 from mcmj.simulation.simulation import Simulation
 from mcmj.targets.limit_cycles import TARGETS, target
 from mcmj.utils.errors import InvalidArgumentError, UnknownNameError
+from mcmj.utils.progress import OnSteps
 from mcmj.utils.validation import Array, require_count, require_number
-
-OnRuns = Callable[[int], object]
 
 
 @dataclass(frozen=True)
@@ -145,7 +143,7 @@ def total_runs(config: Config) -> int:
     return config.seeds * (1 + len(config.methods) * len(config.counts))
 
 
-def run(config: Config, *, on_runs: OnRuns = lambda runs: None) -> Result:
+def run(config: Config, *, on_steps: OnSteps = lambda steps: None) -> Result:
     """Teach every body once, then run readouts of its most important springs alone.
 
     Raises:
@@ -153,11 +151,11 @@ def run(config: Config, *, on_runs: OnRuns = lambda runs: None) -> Result:
         BodyFileError, InvalidArgumentError: a body that cannot do the task.
     """
     return Result(
-        config, [_of_body(config.of_seed(k), config, on_runs) for k in range(config.seeds)]
+        config, [_of_body(config.of_seed(k), config, on_steps) for k in range(config.seeds)]
     )
 
 
-def _of_body(one: limit_cycle.Config, config: Config, on_runs: OnRuns) -> Pruned:
+def _of_body(one: limit_cycle.Config, config: Config, on_steps: OnSteps) -> Pruned:
     body, _, _ = limit_cycle.get_body(one)
     wanted, teaching = target(config.task), config.teaching
     limit_cycle.check_task(one, body, wanted)
@@ -170,7 +168,7 @@ def _of_body(one: limit_cycle.Config, config: Config, on_runs: OnRuns) -> Pruned
 
     def error(springs: np.ndarray) -> float:
         readout = sense_only(regression, springs, ridge)
-        on_runs(1)
+        on_steps(1)
         return float(
             closed_loop_errors(
                 simulation, readout, starts, wanted, free_run=config.free_run, window=config.window

@@ -1,49 +1,79 @@
 """The command: render."""
 
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 
 from rich.console import Console
 
-from mcmj.experiments.command_line import Output, main
+from mcmj.experiments.base import Experiment
 from mcmj.experiments.render.run import Config, run
 from mcmj.learning.lessons import Teaching
-from mcmj.pictures.rendering import write_film
-from mcmj.utils import files
-from mcmj.utils.progress import progress_bar
+from mcmj.pictures.film import Film
+from mcmj.pictures.rendering import Report, write_film
+from mcmj.utils.progress import OnSteps, progress_bar
 
 NAME = "film"
 
 
-def work(config: Config, output: Output, out: Path) -> None:
-    longest = config.before + config.during + config.after + Teaching().total
-    with progress_bar("running", round(1e3 * longest), quiet=output.quiet) as on_steps:
-        film = run(config, on_steps=on_steps)
-    paths = {f".{kind}": out / f"{NAME}.{kind}" for kind in config.formats}
-    frames = len(film.pick(config.style.fps, config.style.speed))
-    with progress_bar("drawing", frames, quiet=output.quiet) as on_frames:
-        report = write_film(film, paths, config.style, stills=config.stills, on_frames=on_frames)
+@dataclass(frozen=True)
+class Rendered:
+    """A film, and how its pictures were made."""
+
+    config: Config
+    film: Film
+    report: Report
+
+    @property
+    def metrics(self) -> Mapping[str, object]:
+        """Of the film and of its drawing."""
+        return {
+            **self.report.metrics,
+            "deformation": self.film.scale,
+            "largest_force": self.film.largest_force,
+            "largest_strain": self.film.largest_strain,
+            "pace": self.config.style.pace,
+            "duration": float(self.film.times[-1] - self.film.times[0]),
+        }
+
+
+def longest_run(config: Config) -> float:
+    """Of the body, teaching included, in simulated seconds."""
+    return config.before + config.during + config.after + Teaching().total
+
+
+def render(config: Config, folder: Path, on_steps: OnSteps) -> Rendered:
+    """Run, then draw; progress is counted in milliseconds run and in milliseconds drawn."""
+    film = run(config, on_steps=on_steps)
+    paths = {f".{kind}": folder / f"{NAME}.{kind}" for kind in config.formats}
+    frame = round(1e3 * config.style.speed / config.style.fps)
+    report = write_film(
+        film, paths, config.style, stills=config.stills, on_frames=lambda _: on_steps(frame)
+    )
     if report.why_flat:
         print(f"render: drawn by matplotlib: {report.why_flat}", file=sys.stderr)
-    metrics = {
-        **report.metrics,
-        "deformation": film.scale,
-        "largest_force": film.largest_force,
-        "largest_strain": film.largest_strain,
-        "pace": config.style.pace,
-        "duration": float(film.times[-1] - film.times[0]),
-    }
-    files.write_metrics(out / "metrics.json", "render", config, config.seed, metrics)
-    if not output.quiet:
-        Console().print(
-            f"{report.metrics['frames']} frames by {report.backend}, median "
-            f"{report.metrics['body_frame_ms']:.1f} ms a picture of the body (640x480), "
-            f"{report.metrics['whole_frame_ms']:.1f} ms a frame; deformation x {film.scale:g}, "
-            f"{config.style.pace}; in {out}"
-        )
+    return Rendered(config, film, report)
 
 
-def command(arguments: Sequence[str] | None = None) -> None:
-    """Run it with the arguments of a command line."""
-    main("render", Config, work, arguments)
+def show(result: Rendered, console: Console) -> None:
+    """How the film was drawn."""
+    metrics = result.report.metrics
+    console.print(
+        f"{metrics['frames']} frames by {result.report.backend}, median "
+        f"{metrics['body_frame_ms']:.1f} ms a picture of the body (640x480), "
+        f"{metrics['whole_frame_ms']:.1f} ms a frame; deformation x {result.film.scale:g}, "
+        f"{result.config.style.pace}"
+    )
+
+
+EXPERIMENT = Experiment(
+    name="render",
+    config=Config,
+    run=render,
+    show=show,
+    bar=lambda config, quiet: progress_bar(
+        "running and drawing", round(1e3 * (longest_run(config) + config.duration)), quiet=quiet
+    ),
+    needs_folder=True,
+)

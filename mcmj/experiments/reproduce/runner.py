@@ -13,6 +13,7 @@ from mcmj.utils import files
 from mcmj.utils.errors import McmjError
 
 ACCOUNT = "account.json"
+PROGRAM = (sys.executable, "-m", "mcmj")
 
 
 def options_of(run: Run, *, quick: bool) -> tuple[str, ...] | None:
@@ -28,15 +29,20 @@ def finished(run: Run, options: Sequence[str], folder: Path) -> bool:
         return False
 
 
-def execute(run: Run, options: Sequence[str], folder: Path, scripts: Path) -> None:
+def execute(
+    run: Run, options: Sequence[str], folder: Path, program: Sequence[str] = PROGRAM
+) -> None:
     """Run a command into folder/<name>; what was there before is removed.
+
+    Args:
+        program: what carries out experiments, before their name and options.
 
     Raises:
         McmjError: it failed: with its own message.
     """
     out = folder / run.name
     shutil.rmtree(out, ignore_errors=True)
-    command = [sys.executable, str(scripts / f"{run.script}.py"), *options, "--quiet"]
+    command = [*program, run.script, *options, "--quiet"]
     done = subprocess.run([*command, "--out", str(out)], stderr=subprocess.PIPE, text=True)
     if done.returncode:
         told = " ".join([run.script, *options])

@@ -1,18 +1,17 @@
 """The command: search."""
 
-from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
+from matplotlib.figure import Figure
 from rich.console import Console
 from rich.table import Table
 
-from mcmj.experiments.command_line import Output, main
+from mcmj.experiments.base import Experiment
 from mcmj.experiments.search.figure import best_bodies_figure, score_figure, success_rate_figure
-from mcmj.experiments.search.run import Config, Result, run, total_trials
+from mcmj.experiments.search.run import Config, OnTrial, Result, run, total_trials
 from mcmj.mjcf.read import from_mjcf
-from mcmj.pictures.plotting import save
 from mcmj.search.database import TrialStore
 from mcmj.search.export import write_csv, write_parquet
 from mcmj.utils import files
@@ -21,36 +20,39 @@ from mcmj.utils.progress import trial_bar
 from mcmj.utils.success_rates import rate_cells
 
 
-def work(config: Config, output: Output, out: Path) -> None:
-    path = config.store or out / "trials.sqlite"
-    with trial_bar(
-        "trials", total_trials(config), maximise=config.maximise, quiet=output.quiet
-    ) as on_trial:
-        result = run(config, store=path, on_trial=on_trial)
-    write(result, out)
-    with TrialStore(path, create=False) as kept:
-        write_csv(kept, out / "trials.csv")
-        with suppress(McmjError):  # pyarrow is an extra
-            write_parquet(kept, out / "trials.parquet")
-    if not output.quiet:
-        show(result, out)
+def resume(config: Config, folder: Path, on_steps: OnTrial) -> Result:
+    """The search; its store is in the folder, if the config names none."""
+    return run(config, store=store_path(config, folder), on_trial=on_steps)
 
 
-def write(result: Result, out: Path) -> None:
-    config = result.config
+def store_path(config: Config, folder: Path) -> Path:
+    """Where the trials are kept."""
+    return config.store or folder / "trials.sqlite"
+
+
+def write(result: Result, folder: Path) -> None:
+    """The best bodies, and all trials as tables."""
     for place, xml in enumerate(result.bodies, start=1):
-        files.write_text(out / (f"best_{place}.xml" if place > 1 else "best.xml"), xml)
+        files.write_text(folder / (f"best_{place}.xml" if place > 1 else "best.xml"), xml)
+    with TrialStore(store_path(result.config, folder), create=False) as kept:
+        write_csv(kept, folder / "trials.csv")
+        with suppress(McmjError):  # pyarrow is an extra
+            write_parquet(kept, folder / "trials.parquet")
+
+
+def figures(result: Result) -> dict[str, Figure]:
+    """Success rates by setting, scores, the best bodies."""
+    config, found = result.config, {}
     if result.by_setting:
-        save(success_rate_figure(result.by_setting), out / "success_rate.png")
-    figure = score_figure(
+        found["success_rate"] = success_rate_figure(result.by_setting)
+    found["scores"] = score_figure(
         groups(result), config.threshold, name=config.target.name, maximise=config.maximise
     )
-    save(figure, out / "scores.png")
     if result.bodies:
         titles = [title(result, int(index)) for index in result.ranking]
         bodies = [from_mjcf(xml)[0] for xml in result.bodies]
-        save(best_bodies_figure(list(zip(bodies, titles, strict=False))), out / "best_bodies.png")
-    files.write_metrics(out / "metrics.json", "search", config, config.first_seed, result.metrics)
+        found["best_bodies"] = best_bodies_figure(list(zip(bodies, titles, strict=False)))
+    return found
 
 
 def groups(result: Result) -> dict[str, np.ndarray]:
@@ -64,21 +66,25 @@ def groups(result: Result) -> dict[str, np.ndarray]:
 
 
 def label(setting: dict[str, object]) -> str:
+    """A setting in a few words."""
     return ", ".join(f"{path.rpartition('.')[2]} {short(value)}" for path, value in setting.items())
 
 
 def short(value: object) -> str:
+    """Three digits."""
     return f"{value:.3g}" if isinstance(value, float) else str(value)
 
 
 def title(result: Result, index: int) -> str:
+    """What a body is called in figures and tables."""
     row = result.describe(index)
     score = row["score"] if row["confirmed_score"] is None else row["confirmed_score"]
     where = label(result.settings[index // result.config.seeds])
     return f"seed {row['seed']}: {short(score)}" + (f" ({where})" if where else "")
 
 
-def show(result: Result, out: Path) -> None:
+def show(result: Result, console: Console) -> None:
+    """The result as tables."""
     config, metrics, console = result.config, result.metrics, Console()
     side = "above" if config.maximise else "below"
     table = Table(title=f"{config.experiment}: {config.target.path} {side} {config.threshold:g}")
@@ -105,15 +111,26 @@ def show(result: Result, out: Path) -> None:
             f"confirmed in MuJoCo: {len(result.confirmations)} trials, the same verdict in "
             f"{100 * result.agreement:.1f} %"
         )
-    console.print(f"results in {out}")
 
 
 def bounds(row: dict[str, object]) -> str:
+    """The value of a setting, or the range of its bin."""
     if "low" in row:
         return f"{short(row['low'])} to {short(row['high'])}"
     return short(row["value"])
 
 
-def command(arguments: Sequence[str] | None = None) -> None:
-    """Run it with the arguments of a command line."""
-    main("search", Config, work, arguments)
+EXPERIMENT = Experiment(
+    name="search",
+    config=Config,
+    run=resume,
+    show=show,
+    bar=lambda config, quiet: trial_bar(
+        "trials", total_trials(config), maximise=config.maximise, quiet=quiet
+    ),
+    seed=lambda config: config.first_seed,
+    write=write,
+    figures=figures,
+    needs_folder=True,
+    resumes=True,
+)

@@ -1,3 +1,6 @@
-"""The work-precision diagram: error against DOP853 over cost, every integrator, several bodies."""
+"""Work-precision: error against DOP853 over cost.
+
+Every integrator, several bodies.
+"""
 
 GROUP = "speed and accuracy"

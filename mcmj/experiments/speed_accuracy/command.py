@@ -2,28 +2,27 @@
 
 import csv
 import io
-from collections.abc import Sequence
 from pathlib import Path
 
+from matplotlib.figure import Figure
 from rich.console import Console
 from rich.table import Table
 
-from mcmj.experiments.command_line import Output, main
+from mcmj.experiments.base import Experiment
 from mcmj.experiments.speed_accuracy.figure import work_precision_figure
 from mcmj.experiments.speed_accuracy.run import BASE, Config, Result, run
-from mcmj.pictures.plotting import save
 from mcmj.utils import files
 from mcmj.utils.progress import progress_bar
 
 
-def work(config: Config, output: Output, out: Path) -> None:
-    with progress_bar("bodies", len(config.bodies), quiet=output.quiet) as on_bodies:
-        result = run(config, on_bodies=on_bodies)
-    files.write_text(out / "speed_accuracy.csv", as_csv(result))
-    save(work_precision_figure(result.cells, result.orders), out / "speed_accuracy.png")
-    files.write_metrics(out / "metrics.json", "speed_accuracy", config, config.seed, result.metrics)
-    if not output.quiet:
-        show(result, out)
+def write(result: Result, folder: Path) -> None:
+    """All cells as a table."""
+    files.write_text(folder / "speed_accuracy.csv", as_csv(result))
+
+
+def figures(result: Result) -> dict[str, Figure]:
+    """Work against precision."""
+    return {"speed_accuracy": work_precision_figure(result.cells, result.orders)}
 
 
 def as_csv(result: Result) -> str:
@@ -41,7 +40,8 @@ def as_csv(result: Result) -> str:
     return text.getvalue()
 
 
-def show(result: Result, out: Path) -> None:
+def show(result: Result, console: Console) -> None:
+    """The result as tables."""
     console = Console(width=40 + 16 * len(result.cells))
     step = 1.0 if 1.0 in result.config.steps_ms else result.config.steps_ms[0]
     table = Table(title=f"error at {step:g} ms (cost over {BASE})")
@@ -62,9 +62,14 @@ def show(result: Result, out: Path) -> None:
     for task, errors in result.attractor.items():
         pairs = ", ".join(f"{name} {100 * error:.2f} %" for name, error in errors.items())
         console.print(f"  {task}: {pairs}")
-    console.print(f"results in {out}")
 
 
-def command(arguments: Sequence[str] | None = None) -> None:
-    """Run it with the arguments of a command line."""
-    main("speed_accuracy", Config, work, arguments)
+EXPERIMENT = Experiment(
+    name="speed_accuracy",
+    config=Config,
+    run=run,
+    show=show,
+    bar=lambda config, quiet: progress_bar("bodies", len(config.bodies), quiet=quiet),
+    write=write,
+    figures=figures,
+)

@@ -20,6 +20,7 @@ from mcmj.mjcf.bundled import body_path
 from mcmj.mjcf.read import from_mjcf
 from mcmj.reference.integration import integrate
 from mcmj.utils.errors import DivergenceError, InvalidArgumentError, UnknownNameError
+from mcmj.utils.progress import OnSteps
 from mcmj.utils.seeds import stream
 from mcmj.utils.timing import interleaved_seconds
 from mcmj.utils.validation import (
@@ -164,12 +165,12 @@ class Result:
         return table
 
 
-def run(config: Config, *, on_bodies: Callable[[int], object] = lambda bodies: None) -> Result:
+def run(config: Config, *, on_steps: OnSteps = lambda steps: None) -> Result:
     """Measure every body."""
     cells, consistency = {}, {}
     for name in config.bodies:
         cells[name], consistency[name] = _run_body(config, BODIES[name](config.seed))
-        on_bodies(1)
+        on_steps(1)
     orders = {m: observed_order(cells, m) for m in config.methods}
     attractor = {}
     if config.attractor:

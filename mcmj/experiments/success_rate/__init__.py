@@ -1,3 +1,6 @@
-"""How many random bodies of consecutive seeds learn all three limit cycles."""
+"""How many random bodies learn all three limit cycles.
+
+Bodies of consecutive seeds, on the twin.
+"""
 
 GROUP = "search"

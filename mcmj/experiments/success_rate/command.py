@@ -1,14 +1,14 @@
 """The command: success_rate."""
 
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from matplotlib.figure import Figure
 from rich.console import Console
 from rich.table import Table
 
 from mcmj.core.random_body import draw_body
-from mcmj.experiments.command_line import Output, main
+from mcmj.experiments.base import Experiment
 from mcmj.experiments.success_rate.run import Config, Result, run
 from mcmj.mjcf.write import to_mjcf
 from mcmj.pictures import plotting
@@ -16,17 +16,14 @@ from mcmj.utils import files
 from mcmj.utils.progress import progress_bar
 
 
-def work(config: Config, output: Output, out: Path) -> None:
-    with progress_bar("bodies", config.seeds, quiet=output.quiet) as on_seeds:
-        result = run(config, on_seeds=on_seeds)
-    figure = plotting.success_figure(result.orbit_errors, config.threshold)
-    plotting.save(figure, out / "success_rate.png")
-    files.write_text(out / "best.xml", best_body(result))
-    files.write_metrics(
-        out / "metrics.json", "success_rate", config, config.first_seed, result.metrics
-    )
-    if not output.quiet:
-        show(result, out)
+def write(result: Result, folder: Path) -> None:
+    """The best body."""
+    files.write_text(folder / "best.xml", best_body(result))
+
+
+def figures(result: Result) -> dict[str, Figure]:
+    """Orbit errors of all bodies."""
+    return {"success_rate": plotting.success_figure(result.orbit_errors, result.config.threshold)}
 
 
 def best_body(result: Result) -> str:
@@ -45,7 +42,8 @@ def best_body(result: Result) -> str:
     return to_mjcf(draw_body(seed, config.settings), provenance=provenance)
 
 
-def show(result: Result, out: Path) -> None:
+def show(result: Result, console: Console) -> None:
+    """The result as tables."""
     config = result.config
     table = Table(title=f"orbit error below {100 * config.threshold:g} %")
     for column in ("task", "bodies", "95 % interval", "median orbit error", "median period error"):
@@ -62,12 +60,17 @@ def show(result: Result, out: Path) -> None:
         table.add_row(
             name, f"{cells['successes']} of {cells['of']}", f"{low:.2f} to {high:.2f}", *errors
         )
-    console = Console()
     console.print(table)
-    console.print(f"best body: seed {result.best_seed}, written to {out / 'best.xml'}")
-    console.print(f"results in {out}")
+    console.print(f"best body: seed {result.best_seed}, written to best.xml")
 
 
-def command(arguments: Sequence[str] | None = None) -> None:
-    """Run it with the arguments of a command line."""
-    main("success_rate", Config, work, arguments)
+EXPERIMENT = Experiment(
+    name="success_rate",
+    config=Config,
+    run=run,
+    show=show,
+    bar=lambda config, quiet: progress_bar("bodies", config.seeds, quiet=quiet),
+    seed=lambda config: config.first_seed,
+    write=write,
+    figures=figures,
+)

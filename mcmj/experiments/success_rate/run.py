@@ -92,7 +92,7 @@ class Result:
         return table
 
 
-def run(config: Config, *, on_seeds: OnSteps = lambda seeds: None) -> Result:
+def run(config: Config, *, on_steps: OnSteps = lambda steps: None) -> Result:
     """Teach and run every body on all tasks; a body that blows up counts as a failure."""
     orbit = {name: np.full(config.seeds, np.inf) for name in TARGETS}
     period = {name: np.full(config.seeds, np.inf) for name in TARGETS}
@@ -102,5 +102,5 @@ def run(config: Config, *, on_seeds: OnSteps = lambda seeds: None) -> Result:
             if not isinstance(outcome, DivergenceError):
                 orbit[name][index] = outcome.errors["orbit_error"]
                 period[name][index] = outcome.errors["period_error"]
-        on_seeds(1)
+        on_steps(1)
     return Result(config, orbit, period)

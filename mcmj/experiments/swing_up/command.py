@@ -1,36 +1,36 @@
 """The command: swing_up."""
 
-from collections.abc import Sequence
 from pathlib import Path
 
+from matplotlib.figure import Figure
 from rich.console import Console
 from rich.table import Table
 
-from mcmj.experiments.command_line import Output, main
+from mcmj.experiments.base import Experiment
 from mcmj.experiments.perturb.figure import swing_up_figure
 from mcmj.experiments.swing_up.run import Config, Result, run, total_steps
-from mcmj.pictures.plotting import save
 from mcmj.utils import files
 from mcmj.utils.progress import progress_bar
 
 
-def work(config: Config, output: Output, out: Path) -> None:
-    with progress_bar("teaching, swinging up", total_steps(config), quiet=output.quiet) as on_steps:
-        result = run(config, on_steps=on_steps)
-    first, seed = result.bodies[0], config.of_seed(0).noise_seed
+def write(result: Result, folder: Path) -> None:
+    """The first body's runs from rest."""
+    config, seed = result.config, result.config.of_seed(0).noise_seed
+    arrays = {f"{name}/outputs": task.outputs for name, task in result.bodies[0].items()}
+    files.write_arrays(folder / "trajectory.npz", arrays, config, seed)
+
+
+def figures(result: Result) -> dict[str, Figure]:
+    """Fig. 7 of the first body."""
     runs = {
-        name: (t.target, config.timestep, t.outputs, t.orbit_error, t.swing_up_time)
-        for name, t in first.items()
+        name: (t.target, result.config.timestep, t.outputs, t.orbit_error, t.swing_up_time)
+        for name, t in result.bodies[0].items()
     }
-    save(swing_up_figure(runs), out / "swing_up.png")
-    arrays = {f"{name}/outputs": task.outputs for name, task in first.items()}
-    files.write_arrays(out / "trajectory.npz", arrays, config, seed)
-    files.write_metrics(out / "metrics.json", "swing_up", config, seed, result.metrics)
-    if not output.quiet:
-        show(result, out)
+    return {"swing_up": swing_up_figure(runs)}
 
 
-def show(result: Result, out: Path) -> None:
+def show(result: Result, console: Console) -> None:
+    """The result as tables."""
     config = result.config
     table = Table(title=f"{config.free_run:g} s from total rest")
     for column in ("task", "orbit error", "swing-up time", "rounds of practice", "kicked starts"):
@@ -44,14 +44,21 @@ def show(result: Result, out: Path) -> None:
             str(max(0, len(task.practice_errors) - 1)),
             "none" if kicked is None else f"{100 * kicked:.0f} % arrive",
         )
-    console = Console()
     console.print(table)
     if config.seeds > 1:
         for name, row in result.rates.items():
             console.print(f"{name}: {row['successes']} of {row['of']} bodies swing up")
-    console.print(f"results in {out}")
 
 
-def command(arguments: Sequence[str] | None = None) -> None:
-    """Run it with the arguments of a command line."""
-    main("swing_up", Config, work, arguments)
+EXPERIMENT = Experiment(
+    name="swing_up",
+    config=Config,
+    run=run,
+    show=show,
+    bar=lambda config, quiet: progress_bar(
+        "teaching, swinging up", total_steps(config), quiet=quiet
+    ),
+    seed=lambda config: config.of_seed(0).noise_seed,
+    write=write,
+    figures=figures,
+)

@@ -1,17 +1,16 @@
 """The command: trunk."""
 
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from matplotlib.figure import Figure
 from rich.console import Console
 from rich.table import Table
 
-from mcmj.experiments.command_line import Output, main
+from mcmj.experiments.base import Experiment
 from mcmj.experiments.trunk.config import Config, total_seconds
 from mcmj.experiments.trunk.figure import trunk_figure
 from mcmj.experiments.trunk.run import Result, run
-from mcmj.pictures.plotting import save
 from mcmj.robots.trunk_walker import TIMESTEP
 from mcmj.utils import files
 from mcmj.utils.progress import progress_bar
@@ -19,32 +18,30 @@ from mcmj.utils.progress import progress_bar
 SHOWN = 5.0  # seconds of each gait in the film
 
 
-def work(config: Config, output: Output, out: Path) -> None:
-    total = round(total_seconds(config) / TIMESTEP)
-    with progress_bar("walking", total, quiet=output.quiet) as on_steps:
-        result = run(config, on_steps=on_steps)
-    files.write_metrics(out / "metrics.json", "trunk", config, config.seed, result.metrics)
+def write(result: Result, folder: Path) -> None:
+    """The readouts that were learned."""
     arrays = {
         f"{name}/w_out": gait.learned.w_out
         for name, gait in result.gaits.items()
         if gait.learned is not None
     }
-    files.write_arrays(out / "readouts.npz", arrays, config, config.seed)
+    files.write_arrays(folder / "readouts.npz", arrays, result.config, result.config.seed)
+
+
+def figures(result: Result) -> dict[str, Figure]:
+    """The trunk, and how it walks."""
     walks = {
         name: (gait.target, gait.walk)
         for name, gait in result.gaits.items()
         if gait.walk is not None
     }
-    if walks:
-        trunk = next(iter(result.gaits.values())).trunk
-        save(trunk_figure(trunk, walks), out / "trunk.png")
-        if output.video:
-            film(result, out)
-    if not output.quiet:
-        show(result, out)
+    if not walks:
+        return {}
+    return {"trunk": trunk_figure(next(iter(result.gaits.values())).trunk, walks)}
 
 
 def film(result: Result, out: Path) -> None:
+    """The gaits one after another."""
     from mcmj.pictures.trunk_video import trunk_video  # needs OpenGL, the rest does not
 
     walkers = {
@@ -53,8 +50,8 @@ def film(result: Result, out: Path) -> None:
     trunk_video(out / "trunk.mp4", walkers, shown=SHOWN)
 
 
-def show(result: Result, out: Path) -> None:
-    console = Console()
+def show(result: Result, console: Console) -> None:
+    """The result as tables."""
     table: Any = files.plain(result.metrics)
     rows = Table(title=f"{result.config.walking:g} s of walking, springs drive the muscles")
     for name in ("gait", "speed", "cost of transport", "orbit error", "by regression", "falls"):
@@ -75,13 +72,22 @@ def show(result: Result, out: Path) -> None:
             f"{name}: {upright['successes']} of {upright['of']} robots walk without a fall, "
             f"{taught['successes']} in the gait that was taught"
         )
-    console.print(f"results in {out}")
 
 
 def error_text(error: float | None) -> str:
+    """An orbit error, or that the robot fell."""
     return "falls" if error is None else f"{error:.0%}"
 
 
-def command(arguments: Sequence[str] | None = None) -> None:
-    """Run it with the arguments of a command line."""
-    main("trunk", Config, work, arguments)
+EXPERIMENT = Experiment(
+    name="trunk",
+    config=Config,
+    run=run,
+    show=show,
+    bar=lambda config, quiet: progress_bar(
+        "walking", round(total_seconds(config) / TIMESTEP), quiet=quiet
+    ),
+    write=write,
+    figures=figures,
+    film=film,
+)

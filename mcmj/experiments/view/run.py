@@ -83,6 +83,7 @@ class Result:
     outputs: Array
     distances: Array | None
     wall_seconds: float
+    config: Config
 
     @property
     def metrics(self) -> dict[str, object]:
@@ -127,7 +128,7 @@ def run(config: Config) -> Result:
         wall = time.perf_counter() - opened
     seen = np.array(outputs).reshape(-1, body.n_outputs)
     away = orbits.orbit_distances(seen, target(first)) if first in TARGETS and len(seen) else None
-    return Result(np.array(times), seen, away, wall)
+    return Result(np.array(times), seen, away, wall, config)
 
 
 def _body_and_readouts(config: Config) -> tuple[Body, dict[str, Array]]:

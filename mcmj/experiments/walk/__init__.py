@@ -1,7 +1,8 @@
-"""The body walks: a quadruped in 3-D driven by its own compliant network, switched and pushed.
+"""The body walks: a quadruped in 3-D on its own network.
 
-With no arguments: the robot and the body that come with mcmj; walks, switches and pushes.
---parts adapt recover steps: the ground as a part of the computer, other time steps.
+It is switched and pushed. With no arguments: the robot and the body that come with mcmj; walks,
+switches and pushes. --parts adapt recover steps: the ground as a part of the computer, other time
+steps.
 """
 
 GROUP = "robots"

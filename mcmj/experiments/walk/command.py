@@ -1,35 +1,25 @@
 """The command: walk."""
 
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from matplotlib.figure import Figure
 from rich.console import Console
 from rich.table import Table
 
-from mcmj.experiments.command_line import Output, main
+from mcmj.experiments.base import Experiment
 from mcmj.experiments.walk.config import Config, total_steps
 from mcmj.experiments.walk.figure import footfalls, phase_responses, pushes, stride_periods
 from mcmj.experiments.walk.run import Result, run, tour
-from mcmj.pictures.plotting import save
 from mcmj.utils import files
 from mcmj.utils.progress import progress_bar
 
 SHOWN = 4.0  # seconds of footfalls in the figure
 
 
-def work(config: Config, output: Output, out: Path) -> None:
-    with progress_bar("walking", total_steps(config), quiet=output.quiet) as on_steps:
-        result = run(config, on_steps=on_steps)
-    files.write_metrics(out / "metrics.json", "walk", config, config.seed, result.metrics)
-    draw(result, out)
-    if output.video:
-        film(result, out)
-    if not output.quiet:
-        show(result, out)
-
-
-def draw(result: Result, out: Path) -> None:
+def figures(result: Result) -> dict[str, Figure]:
+    """Footfalls, and what the parts of the config ask for."""
+    found = {}
     table: Any = files.plain(result.metrics)
     if result.walks:
         titles = {
@@ -37,25 +27,27 @@ def draw(result: Result, out: Path) -> None:
             + (f"{table[name]['speed_m_s']:.2f} m/s" if table[name]["speed_m_s"] else "falls")
             for name in result.walks
         }
-        save(footfalls(result.walks, titles, shown=SHOWN), out / "footfalls.png")
+        found["footfalls"] = footfalls(result.walks, titles, shown=SHOWN)
     if "push" in table:
         counts = {name: table["push"][name]["survived"] for name in result.config.gaits}
-        save(pushes(counts, result.config.seeds), out / "pushes.png")
+        found["pushes"] = pushes(counts, result.config.seeds)
     if "adapt" in table:
-        save(stride_periods(table["adapt"]), out / "adapt.png")
+        found["adapt"] = stride_periods(table["adapt"])
     if "recover" in table:
-        save(phase_responses(table["recover"], result.config.nudge), out / "recover.png")
+        found["recover"] = phase_responses(table["recover"], result.config.nudge)
+    return found
 
 
 def film(result: Result, out: Path) -> None:
+    """A tour: gaits, switches, a push."""
     from mcmj.pictures.walk_video import Event, walk_video  # needs OpenGL, the rest does not
 
     walker, walk, events = tour(result.lesson)
     walk_video(out / "walk.mp4", walker.model, walk, [Event(*event) for event in events])
 
 
-def show(result: Result, out: Path) -> None:
-    console = Console()
+def show(result: Result, console: Console) -> None:
+    """The result as tables."""
     table: Any = files.plain(result.metrics)
     if result.walks:
         rows = Table(title=f"{result.config.walking:g} s of walking")
@@ -82,9 +74,14 @@ def show(result: Result, out: Path) -> None:
             console.print(f"{name}: of {result.config.seeds} pushes survived {text}")
     if "cost" in table:
         console.print(f"a step costs {table['cost']['ratio']:.2f} times the planar body's alone")
-    console.print(f"results in {out}")
 
 
-def command(arguments: Sequence[str] | None = None) -> None:
-    """Run it with the arguments of a command line."""
-    main("walk", Config, work, arguments)
+EXPERIMENT = Experiment(
+    name="walk",
+    config=Config,
+    run=run,
+    show=show,
+    bar=lambda config, quiet: progress_bar("walking", total_steps(config), quiet=quiet),
+    figures=figures,
+    film=film,
+)

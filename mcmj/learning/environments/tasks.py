@@ -1,8 +1,8 @@
 """What bodies are set to do in an environment, by name; no dm_control here.
 
-A task is a limit cycle of `mcmj.targets.limit_cycles`, a gait of `mcmj.targets.gaits`, or the rhythm that an input
-chooses (`mcmj.targets.input_systems`): "eps=1" is the quadratic system's cycle at that eps, with the input
-held there.
+A task is a limit cycle of `mcmj.targets.limit_cycles`, a gait of `mcmj.targets.gaits`, or the
+rhythm that an input chooses (`mcmj.targets.input_systems`): "eps=1" is the quadratic system's
+cycle at that eps, with the input held there.
 """
 
 import functools

@@ -1,4 +1,4 @@
-"""The compiled twin behind the interface of `mcmj.simulation.mujoco_engine.Engine`: Simulation(engine="twin")."""
+"""The compiled twin with the interface of MuJoCo's engine: Simulation(engine="twin")."""
 
 import numpy as np
 

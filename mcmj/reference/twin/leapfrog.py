@@ -1,4 +1,6 @@
-"""The leapfrog: second order at one force evaluation a step (mcmj/core/callbacks/leapfrog.py has the account).
+"""The leapfrog: second order at one force evaluation a step.
+
+`mcmj.core.callbacks.leapfrog` has the account:
 
     w' = w + h M^-1 [s F(p, V) + (f_k + f_{k-1}) / 2],   s = 1
     p' = p + h w',   V' = w' + (w' - w) / 2
