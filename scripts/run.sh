@@ -21,8 +21,8 @@ die() { say "$@"; exit 1; }
 
 usage() {
     echo "usage: sh scripts/run.sh COMMAND [args...]     where COMMAND is one of"
-    for f in "$root"/scripts/[!_]*.py; do
-        [ ! -f "$f" ] || echo "    $(basename "$f" .py)"
+    for f in "$root"/mcmj/experiments/*/command.py; do
+        echo "    $(basename "$(dirname "$f")")"
     done
     echo "    test    (pytest, in the repository's folder), or any program of .venv/bin"
 }
@@ -60,35 +60,11 @@ make_venv() {
     echo "$ver $root" >"$state/ours"
 }
 
+# Python's own pip; else the one of the interpreter that made .venv; else Debian's package.
 get_pip() {
     "$vpy" -m pip --version >/dev/null 2>&1 || "$vpy" -m ensurepip >/dev/null 2>&1 ||
-        pip_from_index ||
-        { apt_install "python$ver-venv" ca-certificates && "$vpy" -m ensurepip >/dev/null; }
-}
-
-# pip's own wheel from the package index, checked, then made to install itself.
-pip_from_index() {
-    wheel=$("$vpy" - "$state" 2>"$state/pip.err" <<'EOF'
-import hashlib, html, os, re, ssl, sys, urllib.parse, urllib.request
-tls = ssl.create_default_context(cafile=os.environ.get("PIP_CERT"))
-def get(url):
-    return urllib.request.urlopen(url, timeout=60, context=tls).read()
-index = (os.environ.get("PIP_INDEX_URL") or "https://pypi.org/simple").rstrip("/") + "/pip/"
-found = []
-for link in map(html.unescape, re.findall(r"<a\s.*?</a>", get(index).decode(), re.S)):
-    m = re.search(r'href="([^"#]*\b(pip-([\d.]+)-py3-none-any\.whl))#sha256=(\w{64})"', link)
-    needs = re.search(r'requires-python="\s*>=\s*3\.(\d+)', link)
-    if m and "data-yanked" not in link and (not needs or int(needs[1]) <= sys.version_info[1]):
-        found.append(([int(n) for n in m[3].split(".")], *m.group(1, 2, 4)))
-_, href, name, sha256 = max(found)
-wheel = get(urllib.parse.urljoin(index, href))
-assert hashlib.sha256(wheel).hexdigest() == sha256, "wrong checksum: " + href
-with open(os.path.join(sys.argv[1], name), "wb") as f:
-    f.write(wheel)
-print(f.name)
-EOF
-    ) || { say "no pip from the package index: $(tail -n 1 "$state/pip.err")"; return 1; }
-    "$vpy" "$wheel/pip" install -qq --no-index "$wheel" && rm -f "$wheel" "$state/pip.err"
+        { py=$(find_python) && "$py" -m pip --python "$vpy" install -qq pip 2>/dev/null; } ||
+        { apt_install "python$ver-venv" && "$vpy" -m ensurepip >/dev/null; }
 }
 
 set_up_python() {
@@ -177,8 +153,8 @@ shift
 if [ "$name" = test ]; then
     cd "$root"
     exec "$vpy" -m pytest "$@"
-elif [ -f "$root/scripts/$name.py" ]; then
-    exec "$vpy" "$root/scripts/$name.py" "$@"
+elif [ -f "$root/mcmj/experiments/$name/command.py" ]; then
+    exec "$vpy" -m mcmj "$name" "$@"
 elif [ -f "$venv/bin/$name" ]; then
     exec "$venv/bin/$name" "$@"
 fi

@@ -65,6 +65,11 @@ class Experiment:
     needs_folder: bool = False
     resumes: bool = False
 
+    @property
+    def about(self) -> str:
+        """What it is for: the docstring of its folder."""
+        return sys.modules[self.config.__module__.rpartition(".")[0]].__doc__ or ""
+
 
 def carry_out(experiment: Experiment, config: Any, output: Output, folder: Path) -> None:
     """Run an experiment into an existing folder: data first, then pictures, then the table.

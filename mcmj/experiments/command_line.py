@@ -1,10 +1,12 @@
 """The command `mcmj`: experiments by name, arguments, errors, exit status."""
 
+import hashlib
 import json
+import re
 import sys
 import warnings
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import fields, is_dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -17,6 +19,8 @@ from mcmj.experiments.base import Experiment, Output, carry_out
 from mcmj.experiments.registry import GROUPS, entries, experiment_named
 from mcmj.utils.errors import McmjError, McmjWarning
 from mcmj.utils.files import prepare_folder
+
+LONGEST_NAME = 80  # of a folder
 
 
 def main(arguments: Sequence[str]) -> None:
@@ -47,20 +51,57 @@ def overview() -> None:
 
 def command(experiment: Experiment, arguments: Sequence[str]) -> None:
     """Parse the options of an experiment, and carry it out."""
+    config, output = parse(experiment, arguments)
+    folder = prepare_folder(output.out or default_folder(experiment, config))
+    carry_out(experiment, config, replace(output, quiet=output.quiet or output.json), folder)
+    if output.json:
+        document = json.loads((folder / "metrics.json").read_text(encoding="utf-8"))
+        print(json.dumps(document["metrics"], indent=2))
 
-    def work(
+
+def parse(experiment: Experiment, arguments: Sequence[str]) -> tuple[Any, Output]:
+    """The config and the output options that arguments ask for.
+
+    Raises:
+        SystemExit: they are wrong (said on stderr), or ask for help.
+    """
+
+    def both(
         config: Annotated[Any, tyro.conf.OmitArgPrefixes],
         output: Annotated[Output, tyro.conf.OmitArgPrefixes],
-    ) -> None:
-        folder = prepare_folder(output.out or Path("results") / experiment.name)
-        carry_out(experiment, config, replace(output, quiet=output.quiet or output.json), folder)
-        if output.json:
-            document = json.loads((folder / "metrics.json").read_text(encoding="utf-8"))
-            print(json.dumps(document["metrics"], indent=2))
+    ) -> tuple[Any, Output]:
+        return config, output
 
-    work.__annotations__["config"] = Annotated[experiment.config, tyro.conf.OmitArgPrefixes]
-    about = sys.modules[experiment.run.__module__.rpartition(".")[0]].__doc__ or ""
-    tyro.cli(work, prog=f"mcmj {experiment.name}", args=list(arguments), description=about)
+    both.__annotations__["config"] = Annotated[experiment.config, tyro.conf.OmitArgPrefixes]
+    return tyro.cli(
+        both,
+        prog=f"mcmj {experiment.name}",
+        args=list(arguments),
+        description=experiment.about,
+    )
+
+
+def default_folder(experiment: Experiment, config: Any) -> Path:
+    """results/<name>, and the options that are not the default, so that no command overwrites
+    the results of another."""
+    changes = changed_fields(experiment.config(), config)
+    text = "-".join([experiment.name, *(f"{name}={value}" for name, value in changes.items())])
+    plain = re.sub(r"[^\w.,=+-]+", "_", text)
+    if len(plain) > LONGEST_NAME:
+        plain = f"{plain[:LONGEST_NAME]}-{hashlib.sha256(text.encode()).hexdigest()[:8]}"
+    return Path("results") / plain
+
+
+def changed_fields(default: Any, config: Any) -> dict[str, object]:
+    """The fields of nested dataclasses that differ, by their own name."""
+    found: dict[str, object] = {}
+    for field in fields(config):
+        one, other = getattr(default, field.name), getattr(config, field.name)
+        if is_dataclass(other) and type(one) is type(other):
+            found |= changed_fields(one, other)
+        elif one != other:
+            found[field.name] = other
+    return found
 
 
 class _errors_in_one_line:  # noqa: N801  (used as a context manager)

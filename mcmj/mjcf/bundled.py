@@ -20,7 +20,7 @@ from mcmj.utils.errors import OtherPhysicsWarning, UnknownNameError
 from mcmj.utils.validation import Array
 
 # beside the package in the repository; inside it in an installed wheel
-_FOLDERS = (Path(__file__).parent / "bodies", Path(__file__).parent.parent / "bodies")
+_FOLDERS = tuple(parent / "bodies" for parent in Path(__file__).parents[1:3])
 
 
 def body_names() -> list[str]:

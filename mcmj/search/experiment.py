@@ -17,7 +17,6 @@ import hashlib
 import importlib
 import json
 import math
-import pkgutil
 import time
 import warnings
 from collections.abc import Mapping
@@ -258,7 +257,7 @@ def check_versions(outcome: Outcome, where: str = "a worker") -> None:
 
 
 def _full_name(name: str) -> str:
-    return name if "." in name else f"{PACKAGE}.{name}"
+    return name if "." in name else f"{PACKAGE}.{name}.run"
 
 
 @functools.cache  # once a process, as Python loads code once
@@ -275,8 +274,6 @@ def _source_digest(name: str) -> str:
 
 
 def _experiments() -> list[str]:
-    """Names of the modules of mcmj.experiments that can be searched."""
-    package = importlib.import_module(PACKAGE)
-    names = [module.name for module in pkgutil.iter_modules(package.__path__)]
-    modules = {name: importlib.import_module(f"{PACKAGE}.{name}") for name in names}
-    return [name for name, module in modules.items() if hasattr(module, "run")]
+    """Names of the experiments of mcmj that can be searched."""
+    (folder,) = map(Path, importlib.import_module(PACKAGE).__path__)
+    return sorted(path.parent.name for path in folder.glob("*/run.py"))

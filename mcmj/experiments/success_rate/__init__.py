@@ -1,6 +1,6 @@
 """How many random bodies learn all three limit cycles.
 
-Bodies of consecutive seeds, on the twin.
+Bodies of consecutive seeds.
 """
 
 GROUP = "search"

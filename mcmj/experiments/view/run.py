@@ -18,7 +18,7 @@ from mcmj.simulation.simulation import Simulation
 from mcmj.targets.limit_cycles import TARGETS, target
 from mcmj.utils.errors import InvalidArgumentError
 from mcmj.utils.seeds import stream
-from mcmj.utils.validation import Array, require_number
+from mcmj.utils.validation import Array, require_number, require_seed
 
 LONGEST_FRAME = 0.2  # s: a computer that is slower than this shows slow motion
 LAST_FRAMES = 15  # of which the distance at the end is the largest
@@ -48,6 +48,7 @@ class Config:
     press: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
+        require_seed(self.seed)
         require_number("kick_speed", self.kick_speed, 0.0)
         if self.seconds is not None:
             require_number("seconds", self.seconds, 0.0, open_low=True)
