@@ -67,8 +67,10 @@ class Experiment:
 
     @property
     def about(self) -> str:
-        """What it is for: the docstring of its folder."""
-        return sys.modules[self.config.__module__.rpartition(".")[0]].__doc__ or ""
+        """What it is for: the docstring of its folder in mcmj, or of a module of one's own."""
+        module = self.config.__module__
+        place = module.rpartition(".")[0] if module.startswith("mcmj.experiments.") else module
+        return sys.modules[place].__doc__ or ""
 
 
 def carry_out(experiment: Experiment, config: Any, output: Output, folder: Path) -> None:

@@ -1,4 +1,4 @@
-"""Fields of nested frozen dataclasses by dotted path, as in teaching.noise."""
+"""Fields of nested frozen dataclasses by name, as on a command line, or by dotted path."""
 
 import dataclasses
 import functools
@@ -14,8 +14,10 @@ C = TypeVar("C")
 
 
 def override(config: C, changes: Mapping[str, object]) -> C:
-    """A config with other values at dotted paths such as "teaching.noise" or "settings.d1".
+    """A config with other values of fields such as "noise" or "d1".
 
+    A name is looked for in the nested dataclasses too, as the command line's --noise is; with
+    dots it is a path ("teaching.noise").
     Values are fitted to the field's type: lists become tuples, integers floats. The new config
     is checked as any: its dataclasses check themselves on construction, once, with all changes
     made.
@@ -24,21 +26,38 @@ def override(config: C, changes: Mapping[str, object]) -> C:
         UnknownNameError: no such field; the message lists those there are.
         InvalidArgumentError: a value of another type, or one that the config refuses.
     """
-    return _override(config, changes, "")
+    return _override(config, {full_path(config, p): v for p, v in changes.items()}, "")
 
 
 def value_at(config: object, path: str) -> object:
-    """The value of a config at a dotted path.
+    """The value of a config's field, by its name or dotted path.
 
     Raises:
         UnknownNameError: no such field.
     """
-    for name in path.split("."):
+    for name in full_path(config, path).split("."):
         names = [f.name for f in dataclasses.fields(config)]  # type: ignore[arg-type]
         if name not in names:
             raise UnknownNameError(f"field of {type(config).__name__}", name, names)
         config = getattr(config, name)
     return config
+
+
+def full_path(config: object, name: str) -> str:
+    """The dotted path of a field that is named alone, dashes for underscores allowed.
+
+    What is unknown, or has dots, is returned as it is.
+
+    Raises:
+        InvalidArgumentError: several nested fields have that name.
+    """
+    name = name.replace("-", "_")
+    if "." in name or name in _hints(config):
+        return name
+    paths = [path for path in _paths(config) if path.rpartition(".")[2] == name]
+    if len(paths) > 1:
+        raise InvalidArgumentError("setting", f"one of {', '.join(paths)}", repr(name))
+    return paths[0] if paths else name
 
 
 def parse_assignment(text: str) -> tuple[str, object]:
@@ -49,7 +68,7 @@ def parse_assignment(text: str) -> tuple[str, object]:
     """
     path, sign, value = text.partition("=")
     if not sign or not path.strip():
-        raise InvalidArgumentError("setting", "path=value, as in teaching.noise=0.1", repr(text))
+        raise InvalidArgumentError("setting", "field=value, as in noise=0.1", repr(text))
     return path.strip(), parse_value(value)
 
 
@@ -73,6 +92,17 @@ def fitted(path: str, value: object, hint: Any) -> object:
         raise InvalidArgumentError(
             path, getattr(hint, "__name__", str(hint)), repr(value)
         ) from None
+
+
+def _paths(config: object, at: str = "") -> list[str]:
+    """Dotted paths of all fields."""
+    found = []
+    for name in _hints(config):
+        value = getattr(config, name)
+        found.append(at + name)
+        if dataclasses.is_dataclass(value):
+            found += _paths(value, f"{at}{name}.")
+    return found
 
 
 # --- inside ----------------------------------------------------------------------------------

@@ -107,7 +107,7 @@ def test_an_experiment_without_bodies_or_engines_of_its_own(tmp_path, monkeypatc
     ("changes", "error", "text"),
     [
         ({"experiment": "waltz"}, UnknownNameError, "unknown experiment 'waltz'"),
-        ({"set": ("nodes=3",)}, UnknownNameError, "unknown field of Config 'nodes'"),
+        ({"set": ("node=3",)}, UnknownNameError, "unknown field of Config 'node'"),
         ({"vary": ("teaching.noise=3",)}, InvalidArgumentError, "teaching.noise: expected"),
         ({"set": ("seed=3",)}, InvalidArgumentError, "each field once, seed excepted, got seed"),
         ({"set": ("windows=0",), "vary": ("windows=[0]",)}, InvalidArgumentError, "got windows"),

@@ -47,6 +47,13 @@ def test_an_override_changes_its_fields_and_nothing_else(config, changes):
     assert dict(flat(config)) == before
 
 
+@pytest.mark.parametrize("config", CONFIGS, ids=lambda c: type(c).__module__)
+def test_a_field_has_the_name_that_the_command_line_has(config):
+    path = override(config, {"settings.feedback_scale": 3.0, "teaching.noise": 0.5})
+    assert override(config, {"feedback-scale": 3.0, "noise": 0.5}) == path
+    assert value_at(path, "feedback_scale") == value_at(path, "settings.feedback_scale") == 3.0
+
+
 @given(changes=CHANGES)
 def test_json_says_the_same_as_python(changes):
     as_json = {
@@ -61,7 +68,7 @@ def test_json_says_the_same_as_python(changes):
 @pytest.mark.parametrize(
     ("changes", "error", "text"),
     [
-        ({"nodes": 3}, UnknownNameError, "unknown field of Config 'nodes'; valid choices: body,"),
+        ({"node": 3}, UnknownNameError, "unknown field of Config 'node'; valid choices: body,"),
         ({"settings.node": 3}, UnknownNameError, "unknown field of BodySettings 'node'"),
         ({"seed.x": 3}, InvalidArgumentError, "seed.x: expected no fields in seed"),
         ({"settings.nodes": 3.5}, InvalidArgumentError, "settings.nodes: expected int, got 3.5"),
@@ -96,7 +103,7 @@ def test_assignments():
     assert parse_assignment("task = quadratic") == ("task", "quadratic")
     assert parse_assignment("body=null") == ("body", None)
     for text in ("nodes", "=3"):
-        with pytest.raises(InvalidArgumentError, match="expected path=value"):
+        with pytest.raises(InvalidArgumentError, match="expected field=value"):
             parse_assignment(text)
 
 

@@ -2,7 +2,7 @@
 
 Screened with the twin, confirmed in MuJoCo. Killed at any moment, the same command goes on:
 finished trials are in the store. Example: mcmj search --seeds 100 --set task=quadratic
---vary 'teaching.noise=log(0.02,1,6)'
+--vary 'noise=log(0.02,1,6)'
 """
 
 GROUP = "search"

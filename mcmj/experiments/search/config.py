@@ -18,7 +18,7 @@ class Config:
 
     Attributes:
         experiment: limit_cycle, perturb, swing_up, .. or the full name of a module of your own.
-        set: values of its config for all trials, as in teaching.noise=0.1 task=quadratic.
+        set: values of its config for all trials, as in noise=0.1 task=quadratic.
         vary: fields to vary, as in teaching.noise=[0.1,0.2] settings.nodes=int(15,40)
             teaching.ridge_per_row=log(1e-9,1e-3), or a grid of 7 values: =log(1e-9,1e-3,7).
         draws: random settings, if there are ranges.

@@ -48,7 +48,7 @@ class Config:
     press: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        require_seed(self.seed)
+        require_seed("seed", self.seed)
         require_number("kick_speed", self.kick_speed, 0.0)
         if self.seconds is not None:
             require_number("seconds", self.seconds, 0.0, open_low=True)
