@@ -3,11 +3,11 @@
 from dataclasses import dataclass
 
 from mcmj.core.callbacks.spring_laws import NATIVE, SpringLaw
+from mcmj.core.integrators import DEFAULT_INTEGRATOR, TWINNED, integrator_named
 from mcmj.utils.errors import InvalidArgumentError, UnknownNameError
 from mcmj.utils.validation import require_count, require_timestep
 
 ENGINES = ("mujoco", "twin")
-DEFAULT_INTEGRATOR = "Euler"
 
 
 @dataclass(frozen=True)
@@ -33,11 +33,12 @@ class Options:
             raise UnknownNameError("engine", self.engine, ENGINES)
         if self.engine == "twin":
             self._check_twin()
-        elif self.feedback_delay and self.integrator == "RK4":
+        elif integrator_named(self.integrator).stages > 1 and self.feedback_delay:
             raise InvalidArgumentError(
-                "feedback_delay", "0 under RK4, whose inner stages MuJoCo's delayed sensors keep",
+                "feedback_delay",
+                f"0 under {self.integrator}, whose inner stages MuJoCo's delayed sensors keep",
                 self.feedback_delay,
-            )  # fmt: skip
+            )
 
     @property
     def physics_step(self) -> float:
@@ -45,6 +46,7 @@ class Options:
         return self.timestep / self.substeps
 
     def _check_twin(self) -> None:
+        integrator_named(self.integrator, TWINNED, "integrator of the twin")
         for name, only in (("springs", NATIVE), ("feedback_delay", 0), ("substeps", 1)):
             value = getattr(self, name)
             if value != only:

@@ -7,7 +7,7 @@ from typing import Any
 
 from mcmj.core.body import Body
 from mcmj.core.callbacks.spring_laws import NATIVE, SPRING_LAWS
-from mcmj.core.options import DEFAULT_INTEGRATOR
+from mcmj.core.integrators import DEFAULT_INTEGRATOR
 from mcmj.mjcf.read import (
     body_of_model,
     load_model,

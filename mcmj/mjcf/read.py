@@ -9,11 +9,11 @@ import mujoco
 import numpy as np
 
 from mcmj.core.body import Body
-from mcmj.core.callbacks.leapfrog import LEAPFROG
 from mcmj.core.callbacks.pointers import COUPLED_TAG, TAG
+from mcmj.core.integrators import INTEGRATORS
 from mcmj.mjcf.check import require_same_physics
 from mcmj.mjcf.scan import MAX_BYTES, read_body_file, scan
-from mcmj.mjcf.write import INTEGRATORS, READOUT_PREFIX, to_mjcf
+from mcmj.mjcf.write import READOUT_PREFIX, to_mjcf
 from mcmj.utils.errors import BodyFileError, InvalidArgumentError
 from mcmj.utils.quiet import quiet_warnings
 from mcmj.utils.validation import Array
@@ -192,16 +192,27 @@ def spring_law_of_model(model: mujoco.MjModel) -> str:
 def settings_of_model(model: mujoco.MjModel) -> dict[str, Any]:
     """How the file says that its body is stepped: arguments of a Simulation."""
     step, delay, period = _timing(model)
-    leapfrog = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_NUMERIC, LEAPFROG) >= 0
     control = period or step
     return {
         "timestep": control,
-        # MuJoCo's numbers are in the order of these names
-        "integrator": LEAPFROG if leapfrog else INTEGRATORS[int(model.opt.integrator)],
+        "integrator": _integrator(model),
         "springs": spring_law_of_model(model),
         "feedback_delay": round(delay / control),
         "substeps": max(1, round(control / step)),
     }
+
+
+def _integrator(model: mujoco.MjModel) -> str:
+    """Ours, if the model has a numeric of its name; else the one of MuJoCo's that it runs."""
+    running = mujoco.mjtIntegrator(model.opt.integrator).name
+    found = running
+    for row in INTEGRATORS.values():
+        if row.by_callback:
+            if mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_NUMERIC, row.name) >= 0:
+                return row.name
+        elif running == f"mjINT_{row.mujoco_name.upper()}":
+            found = row.name
+    return found
 
 
 def _timing(model: mujoco.MjModel) -> tuple[float, float, float]:

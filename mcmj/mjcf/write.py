@@ -15,15 +15,14 @@ import numpy as np
 import numpy.typing as npt
 
 from mcmj.core.body import Body
-from mcmj.core.callbacks.leapfrog import LEAPFROG, userdata_size
+from mcmj.core.callbacks.leapfrog import userdata_size
 from mcmj.core.callbacks.pointers import TAG
 from mcmj.core.callbacks.spring_laws import SpringLaw, spring_law
-from mcmj.core.options import DEFAULT_INTEGRATOR
+from mcmj.core.integrators import DEFAULT_INTEGRATOR, Integrator, integrator_named
 from mcmj.mjcf.appearance import add_appearance, node_style
-from mcmj.utils.errors import InvalidArgumentError, UnknownNameError
+from mcmj.utils.errors import InvalidArgumentError
 from mcmj.utils.validation import Array, as_array, require_number
 
-INTEGRATORS = ("Euler", "RK4", "implicit", "implicitfast", "discrete", LEAPFROG)
 READOUT_PREFIX = "readout/"
 
 
@@ -44,8 +43,8 @@ def to_mjcf(
     Args:
         body: the body.
         timestep: physics step [s].
-        integrator: one of MuJoCo's names, or "leapfrog": Euler unless mcmj's callbacks are
-            installed, see mcmj.leapfrog.
+        integrator: a name of mcmj.integrators; without mcmj's callbacks it is the row's
+            `mujoco_name`.
         w_out: readout (L, n_outputs), or (L + 1, n_outputs) with a bias in the last row. With
             one the loop is closed wherever mcmj's callbacks are installed; else it is open.
         readouts: more readouts by name, kept in the file; see `readouts_of_model`.
@@ -60,15 +59,14 @@ def to_mjcf(
     require_number("timestep", timestep, 0.0, open_low=True)
     require_number("feedback_delay", feedback_delay, 0.0)
     require_number("control_period", control_period, 0.0)
-    if integrator not in INTEGRATORS:
-        raise UnknownNameError("integrator", integrator, INTEGRATORS)
+    scheme = integrator_named(integrator)
     root = ET.Element("mujoco", model="mcmj body")
-    _add_options(root, body, timestep, integrator)
+    _add_options(root, body, timestep, scheme)
     add_appearance(root, body)
     if readouts and body.n_outputs == 0:
         raise InvalidArgumentError("readouts", "none for a body without outputs", list(readouts))
     checked = {name: checked_readout(body, w, name) for name, w in (readouts or {}).items()}
-    _add_custom(root, body, checked, integrator, spring_law(springs), provenance)
+    _add_custom(root, body, checked, scheme, spring_law(springs), provenance)
     _add_nodes(root, body)
     tendons = ET.SubElement(root, "tendon")
     _add_springs(tendons, body, spring_law(springs))
@@ -107,12 +105,15 @@ def _json(provenance: Mapping[str, object]) -> str:
         raise InvalidArgumentError("provenance", "JSON values", error) from error
 
 
-def _add_options(root: ET.Element, body: Body, timestep: float, integrator: str) -> None:
-    name = "Euler" if integrator == LEAPFROG else integrator
+def _add_options(root: ET.Element, body: Body, timestep: float, scheme: Integrator) -> None:
     option = ET.SubElement(
-        root, "option", timestep=numbers(timestep), gravity="0 0 0", integrator=name
+        root,
+        "option",
+        timestep=numbers(timestep),
+        gravity="0 0 0",
+        integrator=scheme.mujoco_name,
     )
-    if integrator == LEAPFROG:
+    if scheme.by_callback:
         ET.SubElement(root, "size", nuserdata=str(userdata_size(2 * len(body.free))))
     # no contacts, limits or equalities: skip the whole constraint machinery; and keep a state
     # that blew up for the error message instead of resetting it silently
@@ -123,14 +124,14 @@ def _add_custom(
     root: ET.Element,
     body: Body,
     readouts: Mapping[str, Array],
-    integrator: str,
+    scheme: Integrator,
     law: SpringLaw | None,
     provenance: Mapping[str, object] | None,
 ) -> None:
-    """What MJCF has no place for: masses and weights of fixed nodes, more readouts, leapfrog, .."""
+    """What MJCF has no place for: masses and weights of fixed nodes, more readouts, .."""
     custom = ET.Element("custom")  # as text: a numeric takes 500 numbers at most
-    if integrator == LEAPFROG:
-        ET.SubElement(custom, "numeric", name=LEAPFROG, data=numbers(TAG))
+    if scheme.by_callback:
+        ET.SubElement(custom, "numeric", name=scheme.name, data=numbers(TAG))
     extras = {"fixed_masses": body.masses, "fixed_w_in": body.w_in, "fixed_w_fb": body.w_fb}
     for name, array in extras.items():
         values = array[body.fixed]

@@ -30,6 +30,14 @@ OUTPUT_STYLES: tuple[dict[str, Any], ...] = (
     {"color": "black", "ls": "-"},
     {"color": "#1f4fd6", "ls": "--"},
 )
+INTEGRATOR_STYLES = {  # colour, mark
+    "Euler": ("black", "o"),
+    "RK4": ("#1f4fd6", "D"),
+    "implicit": ("#8c6d31", "^"),
+    "implicitfast": ("#bda05a", "v"),
+    "discrete": ("#2a9d3a", "s"),
+    "leapfrog": ("#d62728", "o"),
+}
 TASK_COLOURS = ("#1f4fd6", "black", "#2a9d3a")
 TITLES = {
     "van_der_pol": "Van der Pol",

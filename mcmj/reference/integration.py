@@ -20,8 +20,8 @@ from mcmj.core.rollout_arguments import Drive, check_drive
 from mcmj.core.trajectory import State, Trajectory
 from mcmj.mjcf.write import checked_readout
 from mcmj.reference.dop853 import RTOL, SMALLEST_RTOL, Signal, integrate_continuous, integrate_held
-from mcmj.reference.twin.population import METHODS as TWINS
 from mcmj.reference.twin.population import Population, rest
+from mcmj.reference.twin.stepping import METHODS as TWINS
 from mcmj.utils.errors import UnknownNameError
 from mcmj.utils.validation import Array, as_array, require_number
 

@@ -13,8 +13,8 @@ import numpy as np
 from mujoco.batch import Batch
 
 from mcmj.core.callbacks import install
-from mcmj.core.callbacks.leapfrog import LEAPFROG
 from mcmj.core.callbacks.pointers import TAG
+from mcmj.core.integrators import integrator_named
 from mcmj.mjcf.write import to_mjcf
 from mcmj.robots.quadruped import GRAVITY
 from mcmj.robots.trunk import N_MUSCLES, Trunk
@@ -40,7 +40,7 @@ def trunk_model(
     Raises:
         InvalidArgumentError, UnknownNameError: an argument out of bounds.
     """
-    if integrator == LEAPFROG:
+    if integrator_named(integrator).by_callback:
         raise InvalidArgumentError("integrator", "one of MuJoCo's", integrator)
     settings, n = trunk.settings, trunk.settings.nodes
     spec = mujoco.MjSpec.from_string(to_mjcf(trunk.body, timestep=timestep, integrator=integrator))

@@ -13,8 +13,8 @@ from mujoco.batch import Batch
 from mcmj.core.body import Body
 from mcmj.core.callbacks import install
 from mcmj.core.callbacks.pointers import TAG
+from mcmj.core.integrators import DEFAULT_INTEGRATOR
 from mcmj.core.trajectory import State
-from mcmj.mjcf.write import DEFAULT_INTEGRATOR
 from mcmj.robots.leg_readouts import LegReadout
 from mcmj.robots.quadruped import Quadruped
 from mcmj.robots.rescale import rescaled, rescaled_readout

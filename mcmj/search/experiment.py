@@ -27,7 +27,7 @@ from typing import Any
 
 from threadpoolctl import threadpool_limits
 
-from mcmj.core.options import DEFAULT_INTEGRATOR
+from mcmj.core.integrators import DEFAULT_INTEGRATOR
 from mcmj.core.random_body import draw_body
 from mcmj.mjcf.bundled import body_path
 from mcmj.mjcf.write import to_mjcf

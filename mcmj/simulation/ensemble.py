@@ -4,7 +4,8 @@ import numpy as np
 
 from mcmj.core.body import Body
 from mcmj.core.callbacks.spring_laws import SpringLaw
-from mcmj.core.options import DEFAULT_INTEGRATOR, Options
+from mcmj.core.integrators import DEFAULT_INTEGRATOR
+from mcmj.core.options import Options
 from mcmj.simulation.engines import make_engine
 from mcmj.simulation.simulation import Simulation
 from mcmj.simulation.stepsize.limit import warn_if_unstable

@@ -12,8 +12,9 @@ from mujoco.batch import Batch
 
 from mcmj.core.body import Body
 from mcmj.core.callbacks import install
-from mcmj.core.callbacks.leapfrog import LEAPFROG, node_velocities
+from mcmj.core.callbacks.leapfrog import node_velocities
 from mcmj.core.callbacks.spring_laws import spring_law
+from mcmj.core.integrators import integrator_named
 from mcmj.core.options import Options
 from mcmj.core.rollout_arguments import Drive
 from mcmj.core.trajectory import State
@@ -51,8 +52,9 @@ class Engine:
             control_period=timestep if substeps > 1 else 0.0,
         )
         law = spring_law(options.springs)
-        self._callbacks = {"springs": law is not None, "leapfrog": integrator == LEAPFROG}
-        install.install(**self._callbacks)  # first: MuJoCo's compiler calls them too
+        self._by_callback = integrator_named(integrator).by_callback
+        self._passive = law is not None or self._by_callback
+        install.install(passive=self._passive)  # first: MuJoCo's compiler calls them too
         self.model = load_model(xml)
         self.model.actuator_biasprm[body.n_inputs :, 0] = 0.0  # open until a drive closes it
         if substeps > 1:  # the first sample at t = 0: MJCF takes no phase beyond a period
@@ -85,7 +87,7 @@ class Engine:
 
     def alter(self, cut: Sequence[int], masses: Array | None) -> None:
         """Cut springs and change masses (N,) of all copies, for good."""
-        install.install(**self._callbacks)
+        install.install(passive=self._passive)
         alter(self._batch, self.body, cut, masses)
 
     # --- state -------------------------------------------------------------------------------
@@ -102,7 +104,7 @@ class Engine:
     def set_state(self, positions: object, velocities: object) -> None:
         """Positions and velocities (N, 2) for all copies, or (copies, N, 2); None: as they are."""
         free = self.body.free
-        if self.integrator == LEAPFROG:  # starts anew
+        if self._by_callback:  # starts anew
             self._batch.bind("qvel")[:] = self._joint_velocities()
             self._batch.bind("userdata")[:] = 0.0
         for name, value, field, origin in (
@@ -153,7 +155,7 @@ class Engine:
 
     def prepare(self, drive: Drive) -> None:
         """Set gates and clear old inputs before the first chunk of a drive."""
-        install.install(**self._callbacks)
+        install.install(passive=self._passive)
         if self.body.n_outputs:
             gates = self._batch.expand("actuator_biasprm")[:, self.body.n_inputs :, 0]
             gates[:] = drive.gate

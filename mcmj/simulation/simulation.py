@@ -17,7 +17,8 @@ import numpy as np
 
 from mcmj.core.body import Body
 from mcmj.core.callbacks.spring_laws import SpringLaw
-from mcmj.core.options import DEFAULT_INTEGRATOR, Options
+from mcmj.core.integrators import DEFAULT_INTEGRATOR
+from mcmj.core.options import Options
 from mcmj.core.rollout_arguments import Drive, check_drive
 from mcmj.core.trajectory import RECORDABLE, State, Trajectory, join
 from mcmj.mjcf.write import checked_readout

@@ -15,13 +15,14 @@ from mcmj.analysis.emulation import (
 )
 from mcmj.analysis.spring_arrays import WALL, LinearArray, diverse_array, numerical_rank
 from mcmj.core.callbacks.coupled_laws import CoupledLaw
+from mcmj.core.integrators import INTEGRATORS
 from mcmj.experiments.emulate.run import Config, emulate, emulation_error, reference, run
 from mcmj.experiments.emulate.systems import single, system
 from mcmj.reference.integration import integrate
 from mcmj.simulation.stepsize.limit import stability_limit
 from mcmj.utils.errors import InvalidArgumentError, UnknownNameError
 
-ORDERS = {"Euler": 1.0, "leapfrog": 2.0, "RK4": 4.0}
+ORDERS = {name: row.order for name, row in INTEGRATORS.items() if not row.implicit}
 
 
 @pytest.mark.parametrize("integrator", ["Euler", "leapfrog", "RK4", "implicit", "discrete"])

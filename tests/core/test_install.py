@@ -8,7 +8,7 @@ import twins
 import mcmj
 from mcmj import Simulation, to_mjcf
 from mcmj.core.callbacks import install
-from mcmj.mjcf.write import INTEGRATORS
+from mcmj.core.integrators import INTEGRATORS
 from mcmj.utils.errors import McmjError
 
 T = 400
@@ -173,7 +173,7 @@ def run_neighbour():
 
 def test_other_models_run_as_if_we_were_not_there(no_callbacks, body, w_out):
     before = run_neighbour()
-    install.install(springs=True)
+    install.install(passive=True)
     Simulation(body, w_out=w_out, springs="cubic").rollout(5)
     for name in CALLBACKS:
         assert getattr(mujoco, f"get_{name}")() is not None
@@ -194,10 +194,10 @@ def test_two_bodies_in_one_process_do_not_mix(body, w_out, w_bias):
 
 
 def test_install_is_idempotent(no_callbacks):
-    install.install(springs=True)
+    install.install(passive=True)
     first = [getattr(mujoco, f"get_{name}")() for name in CALLBACKS]
     install.install()
-    install.install(springs=True)
+    install.install(passive=True)
     assert all(getattr(mujoco, f"get_{n}")() is f for n, f in zip(CALLBACKS, first, strict=True))
 
 
@@ -208,7 +208,7 @@ def test_install_without_springs_leaves_their_callback_alone(no_callbacks):
 
 
 def test_uninstall_restores_none_and_may_be_repeated(no_callbacks):
-    install.install(springs=True)
+    install.install(passive=True)
     for _ in range(2):
         install.uninstall()
         assert mujoco.get_mjcb_act_bias() is None
@@ -222,13 +222,13 @@ def test_a_foreign_callback_is_neither_replaced_nor_removed(no_callbacks, body, 
 
     getattr(mujoco, f"set_{name}")(foreign)
     with pytest.raises(McmjError, match=rf"another {name} is installed.*set_{name}\(None\)"):
-        install.install(springs=True)
+        install.install(passive=True)
     with pytest.raises(McmjError, match=name):
         Simulation(body, springs="cubic")
     install.uninstall()
     assert getattr(mujoco, f"get_{name}")() is foreign
     getattr(mujoco, f"set_{name}")(None)
-    install.install(springs=True)
+    install.install(passive=True)
     assert getattr(mujoco, f"get_{name}")() not in (None, foreign)
 
 

@@ -9,7 +9,7 @@ import twins
 import mcmj
 from mcmj import Simulation, SpringLaw
 from mcmj.core.callbacks.spring_laws import SPRING_LAWS, spring_law
-from mcmj.mjcf.write import INTEGRATORS
+from mcmj.core.integrators import INTEGRATORS
 from mcmj.utils.errors import InvalidArgumentError, UnknownNameError
 
 RECORD = ("lengths", "outputs", "positions", "velocities")

@@ -8,10 +8,10 @@ import pytest
 from networks import simulation
 
 import mcmj
+from mcmj.core.integrators import INTEGRATORS
 from mcmj.core.trajectory import State
 from mcmj.experiments.hard_cases.bodies import CASES
 from mcmj.experiments.hard_cases.run import Config, bisect, exact_amplitudes, run, simulate
-from mcmj.mjcf.write import INTEGRATORS
 from mcmj.reference.integration import METHODS
 from mcmj.simulation.stepsize.limit import stability_limit
 from mcmj.utils.errors import DivergenceError

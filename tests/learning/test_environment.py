@@ -8,13 +8,13 @@ import pytest
 pytest.importorskip("dm_control", reason="the extra 'control' is not installed")
 
 import mcmj
+from mcmj.core.integrators import INTEGRATORS
 from mcmj.experiments.drive import run as drive
 from mcmj.learning.environments import environment
 from mcmj.learning.environments.environment import Setting
 from mcmj.learning.teaching import synchronise
 from mcmj.metrics import orbits
 from mcmj.metrics.orbit_window import OrbitWindow
-from mcmj.mjcf.write import INTEGRATORS
 from mcmj.utils.errors import InvalidArgumentError, StabilityWarning, UnknownNameError
 
 SHORT = Setting(time_limit=0.2)

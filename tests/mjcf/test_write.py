@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from mcmj import to_mjcf
+from mcmj.core.integrators import INTEGRATORS
 from mcmj.mjcf.read import load_model
-from mcmj.mjcf.write import INTEGRATORS
 from mcmj.utils.errors import InvalidArgumentError, UnknownNameError
 
 

@@ -6,7 +6,7 @@ import twins
 from rollouts import ALL, T, assert_same, changed
 
 from mcmj import Simulation
-from mcmj.mjcf.write import INTEGRATORS
+from mcmj.core.integrators import INTEGRATORS
 from mcmj.utils.errors import InvalidArgumentError
 
 

@@ -102,7 +102,7 @@ def test_batch_is_mj_step():
 
 def test_forward_changes_nothing():
     body = toolbox_body(2)
-    install.install(leapfrog=True)
+    install.install(passive=True)
     model = mujoco.MjModel.from_xml_string(
         mcmj.to_mjcf(body, integrator="leapfrog", w_out=readout(body))
     )
@@ -147,7 +147,7 @@ def test_other_integrators_run_as_before(integrator):
     states = []
     for leapfrog in (False, True):
         install.uninstall()
-        install.install(leapfrog=leapfrog)
+        install.install(passive=leapfrog)
         states.append(in_mujoco(body, integrator, 50, readout(body)).snapshot())
     assert np.array_equal(*states)
 
@@ -160,7 +160,7 @@ def test_other_models_run_as_before():
     ends = []
     for leapfrog in (False, True):
         install.uninstall()
-        install.install(leapfrog=leapfrog)
+        install.install(passive=leapfrog)
         data = mujoco.MjData(model)
         mujoco.mj_step(model, data, 50)
         ends.append(full_state(model, data))

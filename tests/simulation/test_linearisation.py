@@ -3,7 +3,7 @@ import pytest
 from networks import network, readout, simulation
 
 import mcmj
-from mcmj.mjcf.write import INTEGRATORS
+from mcmj.core.integrators import INTEGRATORS
 from mcmj.reference.dop853 import accelerations
 from mcmj.simulation.stepsize.linearisation import linear_system, linearise
 from mcmj.simulation.stepsize.schemes import step_map

@@ -6,7 +6,7 @@ from rollouts import ALL, changed, exact_oscillator
 
 import mcmj
 from mcmj import Body, Simulation
-from mcmj.mjcf.write import INTEGRATORS
+from mcmj.core.integrators import INTEGRATORS
 
 
 def oscillator_error(body, integrator, timestep, force=0.0):

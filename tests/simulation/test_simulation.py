@@ -5,7 +5,7 @@ import pytest
 from rollouts import ALL
 
 from mcmj import Simulation
-from mcmj.mjcf.write import INTEGRATORS
+from mcmj.core.integrators import INTEGRATORS
 from mcmj.utils.errors import InvalidArgumentError, UnknownNameError
 
 

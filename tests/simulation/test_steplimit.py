@@ -6,11 +6,10 @@ import pytest
 from networks import network, readout, simulation
 
 import mcmj
+from mcmj.core.integrators import INTEGRATORS
 from mcmj.core.options import Options
 from mcmj.experiments.hard_cases.run import bisect
-from mcmj.mjcf.write import INTEGRATORS
 from mcmj.simulation.stepsize.limit import recommend, stability_limit, warn_if_unstable
-from mcmj.simulation.stepsize.schemes import SCHEMES
 from mcmj.utils.errors import InvalidArgumentError, McmjWarning, StabilityWarning, UnknownNameError
 
 TINY = 1e-12  # damping of what should be undamped
@@ -131,11 +130,11 @@ def test_predicted_limit_in_closed_loop_is_measured(integrator):
 
 def test_large_bodies_are_as_small_ones(monkeypatch):
     body = network(nodes=130, d1=(3.0, 6.0))
-    sparse = [stability_limit(body, name) for name in SCHEMES]
+    sparse = [stability_limit(body, name) for name in INTEGRATORS]
     monkeypatch.setattr("mcmj.simulation.stepsize.eigenvalues.DENSE", 1000)
     monkeypatch.setattr("mcmj.simulation.stepsize.eigenvalues.DENSE_MODES", 1000)
-    dense = dict(zip(SCHEMES, [stability_limit(body, name) for name in SCHEMES], strict=True))
-    for name, limit in zip(SCHEMES, sparse, strict=True):
+    dense = {name: stability_limit(body, name) for name in INTEGRATORS}
+    for name, limit in zip(INTEGRATORS, sparse, strict=True):
         if name == "RK4":  # a bound there
             assert 0.5 * dense[name] < limit <= dense[name]
         else:

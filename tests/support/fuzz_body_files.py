@@ -58,7 +58,7 @@ def batch(seed: int) -> None:
     from mcmj.utils.errors import McmjError
     from mcmj.utils.quiet import quiet_warnings
 
-    install.install(springs=True, leapfrog=True)
+    install.install(passive=True)
     coupled = CoupledLaw("all_springs", _all_springs)
     for i in range(seed, seed + BATCH):
         print(i, flush=True)

@@ -96,22 +96,21 @@ _READOUT = _Callback("mjcb_act_bias", _compile_readout)
 _PASSIVE = _Callback("mjcb_passive", compile_passive)
 
 
-def install(*, springs: bool = False, leapfrog: bool = False) -> None:
+def install(*, passive: bool = False) -> None:
     """Install the readout callback, and that of passive forces if asked; idempotent.
 
     Args:
-        springs: custom spring laws will be used.
-        leapfrog: the integrator leapfrog will be used.
+        passive: custom spring laws, or an integrator by callback, will be used.
 
     Raises:
         McmjError: another package's callback of that kind is installed.
     """
     _READOUT.install()
-    if springs or leapfrog:
+    if passive:
         _PASSIVE.install()
 
 
 def uninstall() -> None:
-    """Take our callbacks out of MuJoCo; others' stay. Loops are then open, leapfrog is Euler."""
+    """Take our callbacks out of MuJoCo; others' stay. Loops are then open, integrators MuJoCo's."""
     _READOUT.uninstall()
     _PASSIVE.uninstall()

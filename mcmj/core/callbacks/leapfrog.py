@@ -36,7 +36,6 @@ from mcmj.core.callbacks.pointers import TAG, WORDS, address_of, doubles, intege
 from mcmj.utils.errors import McmjError
 from mcmj.utils.validation import Array
 
-LEAPFROG = "leapfrog"  # its name among the integrators; in a body file, that of its numeric
 _HEAD = 2  # of userdata, before its five rows
 _LAST = 3  # rows from w_k, f_k to w_{k-1}, f_{k-1}
 

@@ -7,6 +7,7 @@ import mujoco
 import numpy as np
 
 from mcmj.core.body import Body
+from mcmj.core.integrators import DEFAULT_INTEGRATOR, INTEGRATORS
 from mcmj.core.random_body import random_body
 from mcmj.core.rollout_arguments import check_drive
 from mcmj.experiments.benchmark.config import Config, small_readout
@@ -63,7 +64,7 @@ def loop_costs(config: Config, body: Body) -> dict[str, object]:
         soft = replace(body, k3=body.k3 / 100, d3=body.d3 / 100)
         simulation = Simulation(soft, w_out=w_out, springs=springs)
         works[f"{springs}_hook"] = lambda s=simulation: s.rollout(steps)  # type: ignore[misc]
-    for integrator in ("RK4", "discrete", "implicit", "implicitfast"):
+    for integrator in (name for name in INTEGRATORS if name != DEFAULT_INTEGRATOR):
         simulation = Simulation(body, w_out=w_out, integrator=integrator)
         works[integrator] = lambda s=simulation: s.rollout(steps)  # type: ignore[misc]
     seconds = interleaved_seconds(works, config.repeats)

@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 
 from mcmj.core.body import Body
+from mcmj.core.integrators import DEFAULT_INTEGRATOR
 from mcmj.core.random_body import MOST_NODES, BodySettings, draw_body
 from mcmj.metrics.capacity import Capacities, generalisation_rank, kernel_rank, processing_capacity
-from mcmj.mjcf.write import DEFAULT_INTEGRATOR
 from mcmj.simulation.ensemble import Ensemble
 from mcmj.simulation.held_symbols import held_states
 from mcmj.simulation.simulation import Simulation
@@ -60,7 +60,7 @@ class Config:
         map_symbols: symbols of each of the maps' bodies.
         stiffness, damping: factors on k1 and k3, on d1 and d3, of the first map.
         sizes, strengths: nodes, and strengths, of the second map.
-        integrator: Euler, RK4, implicit, implicitfast, discrete or leapfrog.
+        integrator: as for Simulation.
         threads: results do not depend on them.
         settings: what the body is drawn from.
     """

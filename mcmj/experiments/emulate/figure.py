@@ -8,18 +8,19 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from mcmj.pictures.plotting import OUTPUT_STYLES, TARGET_COLOUR, TASK_COLOURS, new_figure
+from mcmj.core.integrators import INTEGRATORS
+from mcmj.pictures.plotting import (
+    INTEGRATOR_STYLES,
+    OUTPUT_STYLES,
+    TARGET_COLOUR,
+    TASK_COLOURS,
+    new_figure,
+)
 from mcmj.utils.validation import Array
 
 COLUMNS = 4
-STYLES = {  # the implicit ones lie on Euler: they are drawn inside its larger marks
-    "Euler": ("black", "o-", 8),
-    "implicit": ("#8c6d31", "^-", 5),
-    "implicitfast": ("#bda05a", "v-", 4),
-    "discrete": ("#2a9d3a", "s-", 3),
-    "leapfrog": ("#d62728", "o-", 4),
-    "RK4": ("#1f4fd6", "D-", 4),
-}
+# the implicit ones lie on Euler: they are drawn inside its larger marks
+MARK_SIZES = {"Euler": 8, "implicit": 5, "discrete": 3}
 
 
 class HasError(Protocol):
@@ -82,11 +83,14 @@ def _draw_errors(
     orders: Mapping[str, float | None],
 ) -> None:
     for name, steps in methods.items():
-        colour, style, size = STYLES[name]
+        colour, mark = INTEGRATOR_STYLES[name]
         points = [(step, cell.error) for step, cell in sorted(steps.items())]
         good = np.array([p for p in points if np.isfinite(p[1])]).reshape(-1, 2)
-        axes.loglog(*good.T, style, color=colour, ms=size, lw=1.2, label=name)
-    shown = [f"{n} {orders[n]:.1f}" for n in ("Euler", "leapfrog", "RK4") if orders.get(n)]
+        axes.loglog(
+            *good.T, mark + "-", color=colour, ms=MARK_SIZES.get(name, 4), lw=1.2, label=name
+        )
+    explicit = (name for name, row in INTEGRATORS.items() if not row.implicit)
+    shown = [f"{name} {orders[name]:.1f}" for name in explicit if orders.get(name)]
     axes.set_title("order: " + ", ".join(shown))
     axes.set(xlabel="step [ms]", ylabel="error / RMS radius", ylim=(1e-14, 3.0))
     axes.grid(alpha=0.25)

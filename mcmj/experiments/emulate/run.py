@@ -16,9 +16,9 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 from mcmj.analysis.emulation import emulation_body
+from mcmj.core.integrators import INTEGRATORS
 from mcmj.experiments.emulate.systems import SYSTEMS, System, mismatched, system, user_system
 from mcmj.metrics.convergence import Order, observed_order
-from mcmj.mjcf.write import INTEGRATORS
 from mcmj.simulation.simulation import Simulation
 from mcmj.utils.errors import (
     DivergenceError,
@@ -56,7 +56,7 @@ class Config:
 
     targets: tuple[str, ...] = tuple(SYSTEMS)
     g: str | None = None
-    integrators: tuple[str, ...] = INTEGRATORS
+    integrators: tuple[str, ...] = tuple(INTEGRATORS)
     steps_ms: tuple[float, ...] = (0.5, 1.0, 2.0, 4.0, 8.0, 16.0)
     horizon: float = 8.0
     mismatches: tuple[float, ...] = (1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1)

@@ -8,11 +8,11 @@ better than the first is that, or memory (a plain delay is no feat beside the se
 
 from dataclasses import dataclass, field
 
+from mcmj.core.integrators import DEFAULT_INTEGRATOR
 from mcmj.core.random_body import BodySettings, draw_body
 from mcmj.experiments.filters.switching import SwitchConfig, SwitchResult, run_switch
 from mcmj.learning.regression import fit_readout
 from mcmj.metrics import orbits
-from mcmj.mjcf.write import DEFAULT_INTEGRATOR
 from mcmj.simulation.held_symbols import held_states
 from mcmj.simulation.simulation import Simulation
 from mcmj.targets.filter_tasks import (
@@ -68,7 +68,7 @@ class Config:
         volterra_gain: the same for the Volterra task, whose input is a fifth as large.
         delay: of delayed_recall [symbols].
         taps: delays of the input that the baseline has, the present among them.
-        integrator: Euler, RK4, implicit, implicitfast, discrete or leapfrog.
+        integrator: as for Simulation.
         engine: mujoco, or twin for quick looks.
         settings: what the body is drawn from.
         switch: the task that needs feedback.

@@ -17,8 +17,8 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 from mcmj.core.body import spring_lengths
+from mcmj.core.integrators import INTEGRATORS
 from mcmj.experiments.hard_cases.bodies import CASES, HardCase
-from mcmj.mjcf.write import INTEGRATORS
 from mcmj.reference.dop853 import accelerations, outputs_of
 from mcmj.simulation.simulation import Simulation
 from mcmj.simulation.stepsize.limit import stability_limit
@@ -52,7 +52,7 @@ class Config:
     """
 
     cases: tuple[str, ...] = ()
-    integrators: tuple[str, ...] = INTEGRATORS
+    integrators: tuple[str, ...] = tuple(INTEGRATORS)
     seed: int = 0
     duration: float = 1.0
     most_steps: int = 20_000

@@ -3,7 +3,8 @@
 from dataclasses import asdict, dataclass, field
 
 from mcmj.core.body import Body
-from mcmj.core.options import DEFAULT_INTEGRATOR, ENGINES
+from mcmj.core.integrators import DEFAULT_INTEGRATOR
+from mcmj.core.options import ENGINES
 from mcmj.core.random_body import BodySettings, draw_body
 from mcmj.learning.free_run import WINDOW
 from mcmj.learning.lessons import Teaching
@@ -29,7 +30,7 @@ class Config:
         free_run: length of the free run in closed loop [s].
         window: the errors are those of this last part of it [s].
         timestep: control and physics step [s].
-        integrator: Euler, RK4, implicit, implicitfast, discrete or leapfrog.
+        integrator: as for Simulation.
         engine: mujoco, or twin: faster, the same to rounding, no video.
         windows: length of the consecutive windows of the free run whose errors are given too
             [s]; 0: none.

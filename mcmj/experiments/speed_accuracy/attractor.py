@@ -3,20 +3,19 @@
 from collections.abc import Sequence
 
 from mcmj.core.body import Body
+from mcmj.core.integrators import TWINNED
 from mcmj.learning.lessons import Teaching
 from mcmj.learning.teaching import synchronise, teach
 from mcmj.metrics.orbits import orbit_error
 from mcmj.simulation.simulation import Simulation
 from mcmj.targets.limit_cycles import TARGETS, target
 
-INTEGRATORS = ("Euler", "leapfrog", "RK4")
-
 
 def attractor_errors(
     body: Body,
     *,
     seed: int,
-    integrators: Sequence[str] = INTEGRATORS,
+    integrators: Sequence[str] = tuple(TWINNED),
     free_run: float = 60.0,
     window: float = 20.0,
     teaching: Teaching | None = None,

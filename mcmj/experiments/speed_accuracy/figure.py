@@ -6,23 +6,19 @@ from typing import Protocol
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from mcmj.pictures.plotting import new_figure
+from mcmj.core.integrators import INTEGRATORS
+from mcmj.pictures.plotting import INTEGRATOR_STYLES, new_figure
 
 STYLES = {
-    "mujoco_Euler": ("black", "o-"),
-    "mujoco_leapfrog": ("#d62728", "o-"),
-    "mujoco_discrete": ("#2a9d3a", "s-"),
-    "mujoco_implicit": ("#8c6d31", "^-"),
-    "mujoco_implicitfast": ("#bda05a", "v-"),
-    "mujoco_RK4": ("#1f4fd6", "D-"),
     "mujoco_Euler_hook": ("0.5", "o:"),
     "mujoco_RK4_hook": ("#8aa4ee", "D:"),
-    "twin_semi_implicit_euler": ("black", "o--"),
-    "twin_leapfrog": ("#d62728", "o--"),
-    "twin_rk4": ("#1f4fd6", "D--"),
     "twin_toolbox_euler": ("#9467bd", "x--"),
     "twin_toolbox_rk": ("#e377c2", "+--"),
 }
+for _name, (_colour, _mark) in INTEGRATOR_STYLES.items():
+    STYLES[f"mujoco_{_name}"] = _colour, _mark + "-"
+    if INTEGRATORS[_name].twin:
+        STYLES[f"twin_{INTEGRATORS[_name].twin}"] = _colour, _mark + "--"
 COLUMNS = 4
 
 

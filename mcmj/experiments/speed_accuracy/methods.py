@@ -3,6 +3,7 @@
 import warnings
 
 from mcmj.core.body import Body
+from mcmj.core.integrators import INTEGRATORS
 from mcmj.core.rollout_arguments import check_drive
 from mcmj.core.trajectory import State
 from mcmj.reference.integration import TWINS, integrate
@@ -12,10 +13,10 @@ from mcmj.utils.errors import StabilityWarning
 from mcmj.utils.timing import Work
 from mcmj.utils.validation import Array
 
-MUJOCO = ("Euler", "leapfrog", "discrete", "implicit", "implicitfast", "RK4")
-HOOKED = ("Euler", "RK4")  # also with the cubic law as a compiled callback
+# MuJoCo's explicit ones, also with the cubic law as a compiled callback
+HOOKED = tuple(name for name, row in INTEGRATORS.items() if not (row.implicit or row.by_callback))
 METHODS = (
-    *(f"mujoco_{name}" for name in MUJOCO),
+    *(f"mujoco_{name}" for name in INTEGRATORS),
     *(f"mujoco_{name}_hook" for name in HOOKED),
     *(f"twin_{name}" for name in TWINS),
 )

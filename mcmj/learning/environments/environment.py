@@ -42,7 +42,7 @@ class Physics(mujoco.Physics):
     def of_body(cls, body: Body, w_out: object, setting: Setting) -> "Physics":
         """A body with its readout (L or L + 1, n_outputs), stepped as the setting says."""
         readout = checked_readout(body, w_out)
-        install.install(leapfrog=setting.leapfrog)
+        install.install(passive=setting.passive)
         xml = to_mjcf(body, timestep=setting.timestep, integrator=setting.integrator, w_out=readout)
         physics = cls.from_xml_string(xml)
         physics.model.actuator_biasprm[body.n_inputs :, 0] = setting.gate
@@ -112,7 +112,7 @@ class Orbit(base.Task):
 
     def initialize_episode(self, physics: Physics) -> None:
         """Rest or a point of the cycle, kicked."""
-        install.install(leapfrog=self.setting.leapfrog)  # another package may have taken them out
+        install.install(passive=self.setting.passive)  # another package may have taken them out
         free = physics.body.free
         velocities = self.setting.kick * self.random.standard_normal((len(free), 2))
         if self._first is not None:
@@ -211,7 +211,7 @@ def make(
         Orbit(body, target, setting, held, first, random),
         time_limit=setting.time_limit,
         control_timestep=setting.control_timestep,
-        legacy_step=False,  # whole steps: the leapfrog must know the action of a step it begins
+        legacy_step=False,  # whole steps: a step knows its action from its start
     )
 
 

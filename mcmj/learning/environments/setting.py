@@ -5,9 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mcmj.core.body import Body
-from mcmj.core.callbacks.leapfrog import LEAPFROG
-from mcmj.core.options import DEFAULT_INTEGRATOR
-from mcmj.mjcf.write import INTEGRATORS
+from mcmj.core.integrators import DEFAULT_INTEGRATOR, INTEGRATORS
 from mcmj.utils.errors import InvalidArgumentError, UnknownNameError
 from mcmj.utils.validation import Array, require_duration, require_number, require_timestep
 
@@ -27,7 +25,7 @@ class Setting:
         gate: 1: the loop is closed; 0: open, the agent is all that feeds back.
         control_timestep: between actions [s], a multiple of the timestep.
         timestep: of the physics [s].
-        integrator: of the physics: Euler, RK4, implicit, implicitfast, discrete or leapfrog.
+        integrator: of the physics, as for Simulation.
         time_limit: of an episode [s].
         good: orbit error up to which the reward is 1.
         margin: further from it than this the reward is below 0.1.
@@ -68,9 +66,9 @@ class Setting:
             )
 
     @property
-    def leapfrog(self) -> bool:
-        """Whether the physics needs mcmj's compiled leapfrog."""
-        return self.integrator == LEAPFROG
+    def passive(self) -> bool:
+        """Whether the physics needs mcmj's passive force callback."""
+        return INTEGRATORS[self.integrator].by_callback
 
     def limits(self, body: Body) -> Array:
         """Largest size of an action on each channel, inputs first; 0 where there is none."""

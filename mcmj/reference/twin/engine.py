@@ -3,15 +3,13 @@
 import numpy as np
 
 from mcmj.core.body import Body, spring_lengths
+from mcmj.core.integrators import integrator_named
 from mcmj.core.options import Options
 from mcmj.core.rollout_arguments import Drive
 from mcmj.core.trajectory import State
 from mcmj.reference.twin.population import Population, rest
-from mcmj.utils.errors import InvalidArgumentError, UnknownNameError
+from mcmj.utils.errors import InvalidArgumentError
 from mcmj.utils.validation import Array, as_array, require_count
-
-# MuJoCo's name -> the twin's method
-TWIN_OF = {"Euler": "semi_implicit_euler", "RK4": "rk4", "leapfrog": "leapfrog"}
 
 
 class TwinEngine:
@@ -23,15 +21,13 @@ class TwinEngine:
     def __init__(self, body: Body, options: Options, *, copies: int, threads: int) -> None:
         require_count("copies", copies, 1)
         timestep, integrator = options.timestep, options.integrator
-        if integrator not in TWIN_OF:
-            raise UnknownNameError("integrator of the twin", integrator, TWIN_OF)
         self.body, self.options = body, options
         self.timestep, self.integrator = timestep, integrator
         self.copies = copies
         self._population = Population(
             [body] * copies,
             [None] * copies,
-            method=TWIN_OF[integrator],
+            method=integrator_named(integrator).twin,
             timestep=timestep,
             threads=threads,
             packed=copies >= 4,

@@ -19,25 +19,9 @@ from mcmj.reference.twin.layout import (
     to_schedule,
 )
 from mcmj.reference.twin.packs import Packs, integrate_packs
-from mcmj.reference.twin.stepping import (
-    LEAPFROG,
-    RK4,
-    SEMI_IMPLICIT_EULER,
-    TOOLBOX_EULER,
-    TOOLBOX_RK,
-    KernelState,
-    Record,
-)
+from mcmj.reference.twin.stepping import LEAPFROG, METHODS, KernelState, Record
 from mcmj.utils.errors import DivergenceError, InvalidArgumentError, UnknownNameError
 from mcmj.utils.validation import Array, require_count, require_number
-
-METHODS = {
-    "semi_implicit_euler": SEMI_IMPLICIT_EULER,
-    "rk4": RK4,
-    "leapfrog": LEAPFROG,
-    "toolbox_euler": TOOLBOX_EULER,
-    "toolbox_rk": TOOLBOX_RK,
-}
 
 
 class Population:

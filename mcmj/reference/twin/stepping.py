@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba import njit
 
+from mcmj.core.integrators import TWINS
 from mcmj.reference.twin.vectors import (
     halves_high,
     halves_low,
@@ -21,7 +22,12 @@ from mcmj.reference.twin.vectors import (
     unpack_low,
 )
 
-SEMI_IMPLICIT_EULER, RK4, LEAPFROG, TOOLBOX_EULER, TOOLBOX_RK = range(5)
+# methods by number; the authors' toolbox has two that MuJoCo has not
+METHODS = {name: i for i, name in enumerate((*TWINS, "toolbox_euler", "toolbox_rk"))}
+SEMI_IMPLICIT_EULER, RK4, LEAPFROG = (
+    METHODS[name] for name in ("semi_implicit_euler", "rk4", "leapfrog")
+)
+TOOLBOX_EULER, TOOLBOX_RK = METHODS["toolbox_euler"], METHODS["toolbox_rk"]
 
 COMPILE: dict[str, Any] = {
     "fastmath": {"contract"},  # not nnan, ninf: a diverging body must be seen to diverge

@@ -15,17 +15,20 @@ import numpy as np
 from mcmj.core.body import Body
 from mcmj.core.callbacks.coupled_laws import CoupledLaw
 from mcmj.core.callbacks.spring_laws import SpringLaw
+from mcmj.core.integrators import DEFAULT_INTEGRATOR, INTEGRATORS, Integrator, integrator_named
 from mcmj.core.options import Options
 from mcmj.simulation.stepsize.eigenvalues import RK4_REACH, limit_of, stable_at
 from mcmj.simulation.stepsize.linearisation import Linearised, linear_system, linearise, slopes
-from mcmj.simulation.stepsize.schemes import ALIASES, SCHEMES
-from mcmj.utils.errors import StabilityWarning, UnknownNameError
+from mcmj.simulation.stepsize.schemes import BY_NAME
+from mcmj.utils.errors import StabilityWarning
 from mcmj.utils.validation import Array, require_number
 
 __all__ = ["Advice", "linearise", "recommend", "stability_limit", "warn_if_unstable"]
 
 SAFETY = 0.9  # a recommended step over the limit
-CHEAPEST_FIRST = ("Euler", "leapfrog", "discrete", "RK4")  # implicit, implicitfast: inaccurate
+CHEAPEST_FIRST = sorted(
+    (row for row in INTEGRATORS.values() if row.advised), key=lambda row: (row.stages, row.implicit)
+)
 
 
 @dataclass(frozen=True)
@@ -70,7 +73,7 @@ def stability_limit(
     at most 1 / s.
 
     Args:
-        integrator: one of SCHEMES, or a compiled twin's name.
+        integrator: a name of mcmj.integrators, or a compiled twin's.
         speed, elongation: largest spring rate [m/s] and elongation [m] expected; numbers or (L,).
         secant: where motions of that size grow, and not small errors on top of them: a longer
             step, at which a run may survive as noise.
@@ -79,7 +82,7 @@ def stability_limit(
     Raises:
         InvalidArgumentError, UnknownNameError: an argument out of bounds.
     """
-    _check_name(integrator)
+    integrator_named(integrator, BY_NAME)
     system = linear_system(
         body,
         positions,
@@ -96,7 +99,7 @@ def stability_limit(
 def recommend(
     body: Body,
     timestep: float,
-    integrator: str = "Euler",
+    integrator: str = DEFAULT_INTEGRATOR,
     *,
     speed: object = 0.0,
     elongation: object = 0.0,
@@ -108,7 +111,7 @@ def recommend(
         InvalidArgumentError, UnknownNameError: an argument out of bounds.
     """
     require_number("timestep", timestep, 0.0, open_low=True)
-    _check_name(integrator)
+    integrator_named(integrator, BY_NAME)
     system = linear_system(body, elongation=elongation, speed=speed, springs=springs)
     return _advice(system, timestep, integrator)
 
@@ -117,9 +120,9 @@ def _advice(system: Linearised, timestep: float, integrator: str) -> Advice:
     limit = limit_of(system, integrator)
     enough = math.ceil(timestep / (SAFETY * limit) - 1e-9) if limit > 0 else 1
     others = [
-        name
-        for name in CHEAPEST_FIRST
-        if name != integrator and stable_at(system, name, timestep / SAFETY)
+        row.name
+        for row in CHEAPEST_FIRST
+        if row.name != integrator and stable_at(system, row.name, timestep / SAFETY)
     ]
     return Advice(integrator, limit, max(1, enough), tuple(others))
 
@@ -129,7 +132,7 @@ def warn_if_unstable(body: Body, options: Options) -> None:
     step, integrator, springs = options.physics_step, options.integrator, options.springs
     if isinstance(springs, CoupledLaw):
         return  # no slopes to go by
-    if integrator not in SCHEMES or _surely_stable(body, step, integrator, springs):
+    if _surely_stable(body, step, integrator_named(integrator), springs):
         return
     system = linear_system(body, springs=springs)
     if stable_at(system, integrator, step):
@@ -143,15 +146,10 @@ def warn_if_unstable(body: Body, options: Options) -> None:
     )
 
 
-def _check_name(integrator: str) -> None:
-    if integrator not in (*SCHEMES, *ALIASES):
-        raise UnknownNameError("integrator", integrator, (*SCHEMES, *ALIASES))
-
-
 # --- a bound in a few operations -------------------------------------------------------------
 
 
-def _surely_stable(body: Body, step: float, integrator: str, springs: str | SpringLaw) -> bool:
+def _surely_stable(body: Body, step: float, scheme: Integrator, springs: str | SpringLaw) -> bool:
     """Sufficient: eigenvalues of M^-1 (K + G) and M^-1 D are at most twice the sum at a node.
 
     (A spring's matrix between two nodes is at most twice its part within the nodes.)
@@ -162,9 +160,9 @@ def _surely_stable(body: Body, step: float, integrator: str, springs: str | Spri
     k, d, tension = slopes(body, x1, np.zeros_like(x1), springs)
     k_top = _largest_at_node(body, np.maximum(k, tension / lengths))
     d_top = _largest_at_node(body, d)
-    if integrator == "RK4":
+    if scheme.stages > 1:
         return step * max(math.sqrt(k_top), d_top) < RK4_REACH
-    return step * step * k_top + (4 if integrator == "leapfrog" else 2) * step * d_top < 4.0
+    return step * step * k_top + scheme.damping_factor * step * d_top < 4.0
 
 
 def _largest_at_node(body: Body, values: Array) -> float:

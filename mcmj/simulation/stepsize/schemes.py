@@ -26,28 +26,26 @@ import numpy as np
 import numpy.typing as npt
 from scipy.sparse import csr_array, diags_array, kron
 
+from mcmj.core.integrators import INTEGRATORS, TWINS
 from mcmj.simulation.stepsize.linearisation import Linearised
 from mcmj.utils.validation import Array
 
-IMPLICIT = ("implicit", "implicitfast", "discrete")
-SCHEMES = ("Euler", "RK4", *IMPLICIT, "leapfrog")
-ALIASES = {"semi_implicit_euler": "Euler", "rk4": "RK4"}  # the compiled twins
+BY_NAME = {**TWINS, **INTEGRATORS}  # a compiled twin takes the same step as MuJoCo
 
 
 def scheme_of(integrator: str, *, known: bool) -> str:
     """The scheme that an integrator is; without derivatives of the springs, often Euler."""
-    name = ALIASES.get(integrator, integrator)
-    return "Euler" if name in IMPLICIT and not known else name
+    row = BY_NAME[integrator]
+    return "Euler" if row.implicit and not known else row.name
 
 
 def pencil(system: Linearised, scheme: str) -> tuple[csr_array, csr_array]:
     """S [N/m] and C [N s/m] (n, n) of the stability condition, open loop; not for RK4."""
     stiffness, damping = system.material + system.geometric, system.damping
-    if scheme == "leapfrog":
-        return stiffness, 4 * damping
     if scheme == "discrete":
         stiffness = stiffness - 2 * system.tangent_material
-    return stiffness, 2 * damping - 4 * known_damping(system.tangent_damping, scheme)
+    factor = INTEGRATORS[scheme].damping_factor
+    return stiffness, factor * damping - 4 * known_damping(system.tangent_damping, scheme)
 
 
 def known_damping(damping: csr_array, scheme: str) -> csr_array:
