@@ -19,9 +19,10 @@ from mcmj.core.callbacks.leapfrog import userdata_size
 from mcmj.core.callbacks.pointers import TAG
 from mcmj.core.callbacks.spring_laws import SpringLaw, spring_law
 from mcmj.core.integrators import DEFAULT_INTEGRATOR, Integrator, integrator_named
+from mcmj.core.readout import checked_readout
 from mcmj.mjcf.appearance import add_appearance, node_style
 from mcmj.utils.errors import InvalidArgumentError
-from mcmj.utils.validation import Array, as_array, require_number
+from mcmj.utils.validation import Array, require_number
 
 READOUT_PREFIX = "readout/"
 
@@ -76,21 +77,6 @@ def to_mjcf(
     _add_sensors(root, body, timestep, feedback_delay, control_period)
     ET.indent(root)
     return ET.tostring(root, encoding="unicode") + "\n"
-
-
-def checked_readout(body: Body, w_out: object, name: str = "w_out") -> Array:
-    """`w_out` as an array (L, n_outputs) or (L + 1, n_outputs).
-
-    Raises:
-        InvalidArgumentError: another shape, or NaN.
-    """
-    array = as_array(name, w_out, (None, body.n_outputs))
-    n = body.n_springs
-    if len(array) not in (n, n + 1):
-        raise InvalidArgumentError(
-            name, f"{n} rows (or {n + 1} with a bias)", f"shape {array.shape}"
-        )
-    return array
 
 
 def numbers(values: npt.ArrayLike) -> str:

@@ -9,6 +9,7 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 from mcmj.core.body import Body, spring_lengths
+from mcmj.core.readout import Readout
 from mcmj.core.rollout_arguments import Drive
 from mcmj.core.trajectory import State, Trajectory
 from mcmj.utils.errors import DivergenceError
@@ -39,16 +40,8 @@ def accelerations(body: Body, positions: Array, velocities: Array, push: Array) 
     return np.where(body.fixed[:, None], 0.0, force / body.masses[:, None])
 
 
-def outputs_of(lengths: Array, w_out: Array | None, n_outputs: int) -> Array:
-    """y = W_out^T l (+ bias) (..., n_outputs) from lengths (..., L)."""
-    if w_out is None:
-        return np.zeros((*lengths.shape[:-1], n_outputs))
-    n = lengths.shape[-1]
-    return lengths @ w_out[:n] + w_out[n:].sum(axis=0)
-
-
 def integrate_held(
-    body: Body, drive: Drive, w_out: Array | None, timestep: float, start: State, *, rtol: float
+    body: Body, drive: Drive, readout: Readout, timestep: float, start: State, *, rtol: float
 ) -> Trajectory:
     """Inputs, offset, forces and feedback held over each control step, as in the loop's law.
 
@@ -59,7 +52,7 @@ def integrate_held(
     k, first_step = 0, None
     while k < drive.steps:
         lengths = spring_lengths(_split(body, state)[0], body.springs)
-        push = _held_push(body, drive, outputs_of(lengths, w_out, body.n_outputs), k)
+        push = _held_push(body, drive, readout.outputs(lengths), k)
         until = k + _same_until(body, drive, k)
         times = timestep * np.arange(until - k + 1, dtype=np.float64)
         try:
@@ -69,13 +62,13 @@ def integrate_held(
         positions = states[:-1, : 2 * body.n_nodes].reshape(-1, body.n_nodes, 2)
         recorded[k:until] = spring_lengths(positions, body.springs)
         state, k = states[-1], until
-    return _trajectory(body, recorded, state, w_out, timestep, start)
+    return _trajectory(body, recorded, state, readout, timestep, start)
 
 
 def integrate_continuous(
     body: Body,
     steps: int,
-    w_out: Array | None,
+    readout: Readout,
     timestep: float,
     start: State,
     *,
@@ -92,7 +85,7 @@ def integrate_continuous(
 
     def push(t: float, positions: Array) -> Array:
         lengths = spring_lengths(positions, body.springs)
-        fed_back = gate * outputs_of(lengths, w_out, body.n_outputs)
+        fed_back = gate * readout.outputs(lengths)
         if offset is not None:
             fed_back = fed_back + offset(t)
         force = body.w_fb @ fed_back
@@ -103,7 +96,7 @@ def integrate_continuous(
     states, _ = _solve(body, push, state, times, rtol, None)
     positions = states[:-1, : 2 * body.n_nodes].reshape(-1, body.n_nodes, 2)
     lengths = spring_lengths(positions, body.springs)
-    return _trajectory(body, lengths, states[-1], w_out, timestep, start)
+    return _trajectory(body, lengths, states[-1], readout, timestep, start)
 
 
 def _constant(push: Array) -> Push:
@@ -192,13 +185,13 @@ def _divergence(time: float, body: Body, state: Array) -> DivergenceError:
 
 
 def _trajectory(
-    body: Body, lengths: Array, last: Array, w_out: Array | None, timestep: float, start: State
+    body: Body, lengths: Array, last: Array, readout: Readout, timestep: float, start: State
 ) -> Trajectory:
     positions, velocities = _split(body, last)
     steps = len(lengths)
     return Trajectory(
         times=start.time + timestep * np.arange(steps, dtype=np.float64),
         lengths=lengths,
-        outputs=outputs_of(lengths, w_out, body.n_outputs),
+        outputs=readout.outputs(lengths),
         final_state=State(positions.copy(), velocities.copy(), start.time + timestep * steps),
     )

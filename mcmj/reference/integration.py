@@ -16,14 +16,14 @@ from dataclasses import replace
 import numpy as np
 
 from mcmj.core.body import Body
+from mcmj.core.readout import Readout
 from mcmj.core.rollout_arguments import Drive, check_drive
 from mcmj.core.trajectory import State, Trajectory
-from mcmj.mjcf.write import checked_readout
 from mcmj.reference.dop853 import RTOL, SMALLEST_RTOL, Signal, integrate_continuous, integrate_held
 from mcmj.reference.twin.population import Population, rest
 from mcmj.reference.twin.stepping import METHODS as TWINS
 from mcmj.utils.errors import UnknownNameError
-from mcmj.utils.validation import Array, as_array, require_number
+from mcmj.utils.validation import as_array, require_number
 
 METHODS = ("dop853", *TWINS)
 
@@ -61,7 +61,7 @@ def integrate(
     """
     if method not in METHODS:
         raise UnknownNameError("method", method, METHODS)
-    readout = None if w_out is None else checked_readout(body, w_out)
+    readout = Readout.of(w_out, body.n_springs, body.n_outputs)
     drive = check_drive(
         body,
         steps=steps,
@@ -69,7 +69,7 @@ def integrate(
         offset=offset,
         gate=gate,
         forces=forces,
-        closed=readout is not None,
+        closed=w_out is not None,
     )
     require_number("timestep", timestep, 0.0, open_low=True)
     start = _checked_state(body, initial_state)
@@ -103,7 +103,7 @@ def integrate_smooth(
     Raises:
         DivergenceError, InvalidArgumentError: as for `integrate`.
     """
-    readout = None if w_out is None else checked_readout(body, w_out)
+    readout = Readout.of(w_out, body.n_springs, body.n_outputs)
     drive = check_drive(
         body,
         steps=steps,
@@ -111,7 +111,7 @@ def integrate_smooth(
         offset=None,
         gate=gate,
         forces=None,
-        closed=readout is not None,
+        closed=w_out is not None,
     )
     require_number("timestep", timestep, 0.0, open_low=True)
     require_number("rtol", rtol, SMALLEST_RTOL, 1e-2)
@@ -129,9 +129,9 @@ def integrate_smooth(
 
 
 def _integrate_twin(
-    body: Body, drive: Drive, w_out: Array | None, method: str, timestep: float, start: State
+    body: Body, drive: Drive, readout: Readout, method: str, timestep: float, start: State
 ) -> Trajectory:
-    population = Population([body], [w_out], method=method, timestep=timestep, states=[start])
+    population = Population([body], [readout], method=method, timestep=timestep, states=[start])
     record, done = population.run(drive, 0, drive.steps)
     if done[0] < drive.steps:
         raise population.divergence(0, int(done[0]), drive.steps)

@@ -11,10 +11,10 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from mcmj.core.body import Body
+from mcmj.core.readout import checked_readout
 from mcmj.core.trajectory import State
 from mcmj.learning.regression import Fit, Regression
 from mcmj.learning.teaching import synchronise
-from mcmj.mjcf.write import checked_readout
 from mcmj.robots.quadruped import Stride
 from mcmj.simulation.simulation import Simulation
 from mcmj.targets.limit_cycles import Target

@@ -14,7 +14,7 @@ the rounding errors of a step of h, and of the same kind: powers of two change n
 from dataclasses import replace
 
 from mcmj.core.body import Body
-from mcmj.mjcf.write import checked_readout
+from mcmj.core.readout import checked_readout
 from mcmj.utils.validation import Array, require_number
 
 

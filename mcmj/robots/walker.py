@@ -14,6 +14,7 @@ from mcmj.core.body import Body
 from mcmj.core.callbacks import install
 from mcmj.core.callbacks.pointers import TAG
 from mcmj.core.integrators import DEFAULT_INTEGRATOR
+from mcmj.core.readout import Readout
 from mcmj.core.trajectory import State
 from mcmj.robots.leg_readouts import LegReadout
 from mcmj.robots.quadruped import Quadruped
@@ -105,7 +106,7 @@ class Walker:
         self._gait = gait
         names = [self.model.actuator(index).name for index in range(self.model.nu)]
         self._law = leg_law(names, self.robot, gait.stride, self.coupling)
-        self._readout = np.hstack([self._with_bias(w) for w in (gait.swing, gait.lift)])
+        self._readout = np.hstack([self._scaled(w).rows for w in (gait.swing, gait.lift)])
         self._hear(self._readout)
 
     def cut_springs(self) -> None:
@@ -227,20 +228,19 @@ class Walker:
         """Command the legs by a readout (L + 1, 8) of the springs."""
         self._batch.expand("actuator_user")[:] = self._law.weights(readout)
 
-    def _with_bias(self, w_out: Array) -> Array:
-        """A readout of the faster, smaller body, (L + 1, 4)."""
-        scaled = rescaled_readout(self.taught, w_out, size=SIZE)
-        missing = self.body.n_springs + 1 - len(scaled)
-        return np.vstack([scaled, np.zeros((missing, len(LEGS)))])
+    def _scaled(self, w_out: Array) -> Readout:
+        """A readout of the smaller body."""
+        rows = rescaled_readout(self.taught, w_out, size=SIZE)
+        return Readout.from_rows(rows, self.body.n_springs)
 
     def _sample(self, joints: bool) -> dict[str, Array]:
         batch, n, trunk = self._batch, self.body.n_springs, self._nodes
         qpos, sensors = batch.bind("qpos"), batch.bind("sensordata")
-        lengths, position = sensors[:, :n], self._readout[:, : len(LEGS)]
+        swing = Readout.from_rows(self._readout[:, : len(LEGS)], n)
         power = batch.bind("qfrc_actuator") * batch.bind("qvel")
         now = {
             "trunk": qpos[:, trunk : trunk + 7].copy(),
-            "outputs": np.einsum("lc,nl->nc", position[:n], lengths) + position[n],
+            "outputs": swing.weighted(sensors[:, :n]) + swing.bias,
             "contact": sensors[:, -len(LEGS) :].copy(),
             "power": np.maximum(power[:, trunk + 6 :], 0.0).sum(axis=1),
         }

@@ -6,6 +6,7 @@ from mcmj.core.body import Body
 from mcmj.core.callbacks.spring_laws import SpringLaw
 from mcmj.core.integrators import DEFAULT_INTEGRATOR
 from mcmj.core.options import Options
+from mcmj.core.readout import Readout, is_pair
 from mcmj.simulation.engines import make_engine
 from mcmj.simulation.simulation import Simulation
 from mcmj.simulation.stepsize.limit import warn_if_unstable
@@ -47,7 +48,8 @@ class Ensemble(Simulation):
         self.set_readout(w_out)
 
     def _checked_readout(self, w_out: object) -> Array:
-        if np.ndim(w_out) != 3:  # type: ignore[arg-type]
+        one = isinstance(w_out, Readout) or is_pair(w_out)
+        if one or np.ndim(w_out) != 3:  # type: ignore[arg-type]
             return super()._checked_readout(w_out)
         readouts = as_array("w_out", w_out, (self._copies, None, self.body.n_outputs))
         for readout in readouts[:1]:  # all have the same shape

@@ -10,9 +10,10 @@ import numpy as np
 
 from mcmj.core.body import Body
 from mcmj.core.callbacks import install
+from mcmj.core.readout import Readout
 from mcmj.core.trajectory import State
 from mcmj.mjcf.read import load_model
-from mcmj.mjcf.write import checked_readout, to_mjcf
+from mcmj.mjcf.write import to_mjcf
 from mcmj.utils.errors import InvalidArgumentError, UnknownNameError
 from mcmj.utils.quiet import quiet_warnings
 from mcmj.utils.validation import MOST_STEPS, Array, require_count, require_number
@@ -42,7 +43,8 @@ class LiveLoop:
             raise InvalidArgumentError("readouts", "at least one", "none")
         self.body, self.timestep, self._start = body, timestep, start
         self._readouts = {
-            name: checked_readout(body, readout, name) for name, readout in readouts.items()
+            name: Readout.of(value, body.n_springs, body.n_outputs, name)
+            for name, value in readouts.items()
         }
         install.install()
         room = np.zeros((body.n_springs + 1, body.n_outputs))
@@ -76,8 +78,7 @@ class LiveLoop:
         with quiet_warnings():
             mujoco.mj_fwdPosition(self._model, self._data)
             mujoco.mj_sensorPos(self._model, self._data)
-        n, w_out = self.body.n_springs, self._readouts[self.readout]
-        now = self._data.sensordata[:n] @ w_out[:n] + w_out[n:].sum(axis=0)
+        now = self._readouts[self.readout].outputs(self._data.sensordata[: self.body.n_springs])
         return np.where(self.frozen, self._data.ctrl[self._feedback], now)
 
     @property
@@ -134,10 +135,7 @@ class LiveLoop:
         if name not in self._readouts:
             raise UnknownNameError("readout", name, self._readouts)
         self.readout = name
-        weights = self._model.actuator_user[self._feedback]
-        weights[:] = 0.0
-        readout = self._readouts[name]
-        weights[:, : len(readout)] = readout.T
+        self._model.actuator_user[self._feedback] = self._readouts[name].rows.T
 
     def switch_next(self) -> None:
         """Close the loop by the next readout, the first after the last."""

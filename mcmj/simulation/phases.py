@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from mcmj.core.body import Body
-from mcmj.mjcf.write import checked_readout
+from mcmj.core.readout import checked_readout
 from mcmj.simulation.damage import checked_cut, checked_masses
 from mcmj.utils.errors import InvalidArgumentError
 from mcmj.utils.validation import as_array, require_count, require_duration, require_number

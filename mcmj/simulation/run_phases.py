@@ -96,14 +96,12 @@ def _run_phase(
     if isinstance(forces, RandomForces):
         forces = forces_of.uniform(-forces.scale, forces.scale, body.n_nodes)
     gate, constant = _gate_and_offset(simulation, phase, last)
-    w_out = simulation.w_out
     for start in range(0, steps, CHUNK):
         n = min(CHUNK, steps - start)
         offset = np.tile(constant, (n, 1))
-        if phase.length_noise > 0 and w_out is not None:
+        if phase.length_noise > 0 and simulation.w_out is not None:
             noise = phase.length_noise * noise_of.standard_normal((n, body.n_springs))
-            # not matmul: its last bits depend on the number of rows
-            offset += gate * np.einsum("tl,lc->tc", noise, w_out[: body.n_springs])
+            offset += gate * simulation.readout.weighted(noise)
         part = simulation.rollout(
             offset=offset, gate=gate, forces=forces, record=tuple({*record, "outputs"})
         )
@@ -114,8 +112,8 @@ def _gate_and_offset(
     simulation: Simulation, phase: Phase, last: Array | None
 ) -> tuple[Array, Array]:
     """Gate and constant offset (n_outputs,) of a phase; frozen channels hold what was `last`."""
-    body, w_out = simulation.body, simulation.w_out
-    gate = np.full(body.n_outputs, float(w_out is not None))
+    body = simulation.body
+    gate = np.full(body.n_outputs, float(simulation.w_out is not None))
     if phase.gate is not None:
         gate[:] = phase.gate
     offset = np.zeros(body.n_outputs)
@@ -129,8 +127,5 @@ def _gate_and_offset(
 
 
 def _outputs_now(simulation: Simulation) -> Array:
-    body, w_out = simulation.body, simulation.w_out
-    if w_out is None:
-        return np.zeros(body.n_outputs)
-    lengths = spring_lengths(simulation.state.positions, body.springs)
-    return lengths @ w_out[: body.n_springs] + w_out[body.n_springs :].sum(axis=0)
+    lengths = spring_lengths(simulation.state.positions, simulation.body.springs)
+    return simulation.readout.outputs(lengths)

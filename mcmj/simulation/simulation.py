@@ -19,9 +19,9 @@ from mcmj.core.body import Body
 from mcmj.core.callbacks.spring_laws import SpringLaw
 from mcmj.core.integrators import DEFAULT_INTEGRATOR
 from mcmj.core.options import Options
+from mcmj.core.readout import Readout, checked_readout
 from mcmj.core.rollout_arguments import Drive, check_drive
 from mcmj.core.trajectory import RECORDABLE, State, Trajectory, join
-from mcmj.mjcf.write import checked_readout
 from mcmj.simulation.damage import checked_cut, checked_masses
 from mcmj.simulation.engines import make_engine
 from mcmj.simulation.mujoco_engine import Engine
@@ -102,8 +102,15 @@ class Simulation:
 
     @property
     def w_out(self) -> Array | None:
-        """The readout in use."""
+        """The readout in use, as one array."""
         return self._w_out
+
+    @property
+    def readout(self) -> Readout:
+        """The readout in use; without one, it always says 0."""
+        if self._w_out is None:
+            return Readout.of(None, self.body.n_springs, self.body.n_outputs)
+        return Readout.from_rows(self._w_out, self.body.n_springs)
 
     def set_readout(self, w_out: object) -> None:
         """Replace the readout, from the next step on; None takes it away.
@@ -274,14 +281,10 @@ class Simulation:
         return Trajectory(times, final_state=self.state, **public)
 
     def _outputs(self, lengths: Array) -> Array:
-        """y = W_out^T l + b, (copies, T, n_outputs)."""
+        """Outputs (copies, T, n_outputs); bits do not depend on the size of the chunks."""
         if self._w_out is None:
             return np.zeros((*lengths.shape[:-1], self.body.n_outputs))
-        n = self.body.n_springs
-        weights = np.ascontiguousarray(np.swapaxes(self._w_out[..., :n, :], -1, -2))
-        bias = self._w_out[..., n:, :].sum(axis=-2, keepdims=True)
-        # not @: BLAS sums a row differently in chunks of another size or on more threads
-        return np.einsum("...tl,...cl->...tc", lengths, weights) + bias
+        return self.readout.outputs_by_row(lengths)
 
 
 def _with_hook(drive: Drive, hook: Hook, step: int, simulation: Simulation) -> Drive:

@@ -12,9 +12,9 @@ import numpy as np
 import numpy.typing as npt
 
 from mcmj.core.body import Body, spring_lengths
+from mcmj.core.readout import Readout, checked_readout
 from mcmj.core.rollout_arguments import check_drive
 from mcmj.core.trajectory import State
-from mcmj.mjcf.write import checked_readout
 from mcmj.reference.twin.population import Population
 from mcmj.utils.errors import DivergenceError
 from mcmj.utils.validation import Array, as_array, require_count, require_number
@@ -63,6 +63,11 @@ class ClosedLoop:
             object.__setattr__(self, "w_out", checked_readout(self.body, self.w_out))
 
     @property
+    def readout(self) -> Readout:
+        """Of the loop; of an open one, it always says 0."""
+        return Readout.of(self.w_out, self.body.n_springs, self.body.n_outputs)
+
+    @property
     def size(self) -> int:
         """n, the dimension of the state."""
         return 4 * len(self.body.free)
@@ -85,10 +90,7 @@ class ClosedLoop:
     def outputs(self, states: Array) -> Array:
         """y = W_out^T l + b, (..., n_outputs), of states (..., n)."""
         lengths = spring_lengths(self.nodes(states)[0], self.body.springs)
-        if self.w_out is None:
-            return np.zeros((*states.shape[:-1], self.body.n_outputs))
-        n = self.body.n_springs
-        return lengths @ self.w_out[:n] + self.w_out[n:].sum(axis=0)
+        return self.readout.outputs(lengths)
 
     def run(
         self,

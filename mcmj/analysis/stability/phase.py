@@ -55,7 +55,7 @@ def fed_back_noise(
     """Offsets (B, T, n_outputs) that white noise (B,) [m] on all lengths amounts to."""
     if loop.w_out is None:
         raise InvalidArgumentError("loop", "a readout to put noise through", None)
-    weights = loop.w_out[: loop.body.n_springs]
+    weights = loop.readout.weights
     values, vectors = np.linalg.eigh(weights.T @ weights)
     root = vectors * np.sqrt(np.maximum(values, 0.0)) @ vectors.T
     white = generator.standard_normal((len(deviations), steps, weights.shape[1]))

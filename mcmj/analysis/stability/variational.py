@@ -37,9 +37,7 @@ class StepMap:
         self._all, self._free = incidence, incidence[:, free]
         self._loop = loop
         self._push = body.w_fb[free]
-        n = body.n_springs
-        readout = np.zeros((n, body.n_outputs)) if loop.w_out is None else loop.w_out
-        self._weights, self._bias = readout[:n], readout[n:].sum(axis=0)
+        self._readout = loop.readout
 
     def __call__(self, state: Array) -> tuple[Array, Array, Array]:
         """Next state (n,), and (n / 2, n / 2) by which dv+ = dv + h/m A dp + h/m B dv."""
@@ -53,14 +51,14 @@ class StepMap:
         tension = x1 * (body.k1 + body.k3 * x1**2) + rate * (body.d1 + body.d3 * rate**2)
         p, q = body.k1 + 3 * body.k3 * x1**2, body.d1 + 3 * body.d3 * rate**2
         force = -self._free.T @ (tension[:, None] * e)
-        force[:, 0] += self._push @ (length @ self._weights + self._bias)
+        force[:, 0] += self._push @ self._readout.outputs(length)
         slope = p[:, None] * e + (q / length)[:, None] * (w - rate[:, None] * e)
         across = _ONE - e[:, :, None] * e[:, None, :]
         by_gap = e[:, :, None] * slope[:, None, :] + (tension / length)[:, None, None] * across
         by_w = (q[:, None] * e)[:, :, None] * e[:, None, :]
         A, B = self._assembled(by_gap), self._assembled(by_w)
         along = (self._free[:, :, None] * e[:, None, :]).reshape(len(e), half)  # dl/dp
-        A[::2] += self._push @ (self._weights.T @ along)
+        A[::2] += self._push @ (self._readout.weights.T @ along)
         kick = h * self._inverse_mass[:, None]
         v = state[half:] + kick[:, 0] * force.ravel()
         return np.concatenate([state[:half] + h * v, v]), kick * A, kick * B

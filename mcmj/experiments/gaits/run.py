@@ -6,13 +6,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from mcmj.core.body import Body
+from mcmj.core.readout import checked_readout
 from mcmj.experiments.gaits.config import Config, check, get_body
 from mcmj.experiments.gaits.result import BodyResult, Result, Run, Taught, measure, outcome
 from mcmj.learning.practice import practise
 from mcmj.learning.regression import Fit
 from mcmj.learning.teaching import Course, lessons_of, synchronise
 from mcmj.metrics import orbits
-from mcmj.mjcf.write import checked_readout
 from mcmj.simulation.phases import Phase, Schedule
 from mcmj.simulation.run_phases import run_schedule
 from mcmj.simulation.simulation import Simulation

@@ -18,8 +18,9 @@ from scipy.integrate import solve_ivp
 
 from mcmj.core.body import spring_lengths
 from mcmj.core.integrators import INTEGRATORS
+from mcmj.core.readout import Readout
 from mcmj.experiments.hard_cases.bodies import CASES, HardCase
-from mcmj.reference.dop853 import accelerations, outputs_of
+from mcmj.reference.dop853 import accelerations
 from mcmj.simulation.simulation import Simulation
 from mcmj.simulation.stepsize.limit import stability_limit
 from mcmj.utils.errors import DivergenceError, StabilityWarning, UnknownNameError
@@ -220,11 +221,12 @@ def exact_amplitudes(case: HardCase, duration: float) -> tuple[Array, Array]:
         DivergenceError: Radau fails, or the body itself blows up.
     """
     body = case.body
+    readout = Readout.of(case.w_out, body.n_springs, body.n_outputs)
 
     def rhs(t: float, state: Array) -> Array:
         positions, velocities = state.reshape(2, -1, 2)
         lengths = spring_lengths(positions, body.springs)
-        push = case.forces + body.w_fb @ outputs_of(lengths, case.w_out, body.n_outputs)
+        push = case.forces + body.w_fb @ readout.outputs(lengths)
         change = accelerations(body, positions, velocities, push)
         return np.concatenate([velocities, change], axis=None)
 

@@ -17,12 +17,13 @@ from dm_env import specs
 from mcmj.core.body import Body
 from mcmj.core.callbacks import install
 from mcmj.core.options import Options
+from mcmj.core.readout import Readout, checked_readout
 from mcmj.core.trajectory import State
 from mcmj.learning.environments.setting import Setting
 from mcmj.learning.environments.tasks import all_tasks as all_tasks
 from mcmj.learning.environments.tasks import assign, state_on_cycle
 from mcmj.metrics.orbit_window import OrbitWindow
-from mcmj.mjcf.write import checked_readout, to_mjcf
+from mcmj.mjcf.write import to_mjcf
 from mcmj.simulation.stepsize.limit import warn_if_unstable
 from mcmj.targets.limit_cycles import Target
 from mcmj.utils.errors import InvalidArgumentError
@@ -67,8 +68,7 @@ class Physics(mujoco.Physics):
 
     def outputs(self) -> Array:
         """What the readout says now (n_outputs,)."""
-        n = self.body.n_springs
-        return self.lengths() @ self.w_out[:n] + self.w_out[n:].sum(axis=0)
+        return Readout.from_rows(self.w_out, self.body.n_springs).outputs(self.lengths())
 
 
 class Orbit(base.Task):

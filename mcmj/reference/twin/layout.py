@@ -6,6 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from mcmj.core.body import Body
+from mcmj.core.readout import Readout
 from mcmj.core.rollout_arguments import Drive
 from mcmj.core.trajectory import State
 from mcmj.reference.twin.kernels import Bodies
@@ -17,7 +18,7 @@ from mcmj.utils.validation import Array
 PACK = 4  # bodies of one topology side by side in a vector register
 
 
-def to_bodies(bodies: Sequence[Body], readouts: Sequence[Array | None]) -> Bodies:
+def to_bodies(bodies: Sequence[Body], readouts: Sequence[object]) -> Bodies:
     """Bodies of any topology but the same channels -> kernel layout, padded to the largest."""
     count = len(bodies)
     nodes = max(_round_up(body.n_nodes) for body in bodies)
@@ -36,11 +37,11 @@ def to_bodies(bodies: Sequence[Body], readouts: Sequence[Array | None]) -> Bodie
         w_out=_aligned((count, n_out * width)),
         bias=_aligned((count, n_out)),
     )
-    for b, (body, readout) in enumerate(zip(bodies, readouts, strict=True)):
+    for b, (body, value) in enumerate(zip(bodies, readouts, strict=True)):
         _fill(layout, b, body, nodes, width)
-        weights, bias = _split_readout(body, readout)
-        layout.w_out[b].reshape(-1, width)[:, : body.n_springs] = weights.T
-        layout.bias[b] = bias
+        readout = Readout.of(value, body.n_springs, n_out)
+        layout.w_out[b].reshape(-1, width)[:, : body.n_springs] = readout.weights.T
+        layout.bias[b] = readout.bias
     return layout
 
 
@@ -61,15 +62,16 @@ def _fill(layout: Bodies, b: int, body: Body, nodes: int, width: int) -> None:
     layout.channels[b].reshape(-1, nodes)[:, :n] = np.hstack([body.w_in, body.w_fb]).T
 
 
-def to_packs(bodies: Sequence[Body], readouts: Sequence[Array | None]) -> Packs:
+def to_packs(bodies: Sequence[Body], readouts: Sequence[object]) -> Packs:
     """Bodies of one topology -> packs of four; the last is repeated to fill the last pack."""
     springs = bodies[0].springs
     if any(not np.array_equal(body.springs, springs) for body in bodies):
         raise InvalidArgumentError("bodies", "one topology", "different springs")
     spare = -len(bodies) % PACK
     padded = [*bodies, *[bodies[-1]] * spare]
-    split = [_split_readout(b, r) for b, r in zip(bodies, readouts, strict=True)]
-    split += [split[-1]] * spare
+    pairs = zip(bodies, readouts, strict=True)
+    checked = [Readout.of(value, len(springs), body.n_outputs) for body, value in pairs]
+    checked += [checked[-1]] * spare
     odd = len(springs) % 2  # readouts are summed two springs at a time
     laws = [np.column_stack([b.rest_lengths, b.k1, b.k3, b.d1, b.d3]) for b in padded]
     return Packs(
@@ -77,8 +79,8 @@ def to_packs(bodies: Sequence[Body], readouts: Sequence[Array | None]) -> Packs:
         laws=_pack(laws),
         mobility=_pack([_mobility(b) for b in padded]),
         channels=_pack([np.hstack([b.w_in, b.w_fb]).T for b in padded]),
-        w_out=_pack([np.pad(weights.T, ((0, 0), (0, odd))) for weights, _ in split]),
-        bias=_pack([bias for _, bias in split]),
+        w_out=_pack([np.pad(r.weights.T, ((0, 0), (0, odd))) for r in checked]),
+        bias=_pack([r.bias for r in checked]),
     )
 
 
@@ -142,13 +144,6 @@ def blank_unused(record: Record, bodies: Sequence[Body], done: npt.NDArray[np.in
 
 def _mobility(body: Body) -> Array:
     return np.where(body.fixed, 0.0, 1.0 / body.masses)
-
-
-def _split_readout(body: Body, readout: Array | None) -> tuple[Array, Array]:
-    """Weights (L, n_outputs) and bias (n_outputs,)."""
-    if readout is None:
-        readout = np.zeros((body.n_springs, body.n_outputs))
-    return readout[: body.n_springs], readout[body.n_springs :].sum(axis=0)
 
 
 def _summation_order(body: Body) -> npt.NDArray[np.int64]:

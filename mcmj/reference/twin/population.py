@@ -33,7 +33,7 @@ class Population:
 
     Args:
         bodies: with the same numbers of channels.
-        readouts: one each, (L, n_outputs) or (L + 1, n_outputs) with a bias; None: none.
+        readouts: one each, in any form that Readout.of takes; None: none.
         method: one of METHODS.
         timestep: control and integration step [s].
         states: where to start; default: at rest.
@@ -47,7 +47,7 @@ class Population:
     def __init__(
         self,
         bodies: Sequence[Body],
-        readouts: Sequence[Array | None],
+        readouts: Sequence[object],
         *,
         method: str,
         timestep: float = 1e-3,
@@ -68,7 +68,7 @@ class Population:
         self.set_states([rest(body) for body in bodies] if states is None else states)
         self.set_readouts(readouts)
 
-    def set_readouts(self, readouts: Sequence[Array | None]) -> None:
+    def set_readouts(self, readouts: Sequence[object]) -> None:
         """Replace all readouts, from the next step on."""
         lay_out = to_packs if self._packed else to_bodies
         self._layout: Bodies | Packs = lay_out(self.bodies, readouts)

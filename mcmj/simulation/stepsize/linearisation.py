@@ -26,7 +26,7 @@ from scipy.sparse import csr_array, diags_array
 from mcmj.core.body import Body
 from mcmj.core.callbacks.coupled_laws import CoupledLaw
 from mcmj.core.callbacks.spring_laws import SpringLaw, cubic, spring_law
-from mcmj.mjcf.write import checked_readout
+from mcmj.core.readout import Readout
 from mcmj.utils.errors import InvalidArgumentError
 from mcmj.utils.validation import Array, as_array, require_above
 
@@ -214,7 +214,7 @@ def _feedback(body: Body, along: csr_array, w_out: object, gate: object) -> csr_
     n = along.shape[1]
     if w_out is None or body.n_outputs == 0:
         return csr_array((n, n))
-    weights = checked_readout(body, w_out)[: body.n_springs]
+    weights = Readout.of(w_out, body.n_springs, body.n_outputs).weights
     gates = as_array("gate", np.broadcast_to(gate, (body.n_outputs,)), (body.n_outputs,))  # type: ignore[call-overload]
     push = np.zeros((n, body.n_outputs))
     push[::2] = body.w_fb[body.free] * gates
