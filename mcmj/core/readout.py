@@ -52,8 +52,8 @@ class Readout:
 
     @property
     def rows(self) -> Array:
-        """One array (n_signals + 1, n_outputs), the bias last."""
-        return np.vstack([self.weights, self.bias])
+        """One array (.., n_signals + 1, n_outputs), the bias last."""
+        return np.concatenate([self.weights, self.bias[..., None, :]], axis=-2)
 
     def outputs(self, signals: Array) -> Array:
         """Outputs y (.., n_outputs) of signals (.., n_signals), fast.

@@ -39,7 +39,8 @@ class Simulation:
 
     Args:
         body: the body.
-        w_out: readout (L, n_outputs), or (L + 1, n_outputs) with a bias in the last row.
+        w_out: readout (L, n_outputs), or (L + 1, n_outputs) with a bias in the last row; a pair
+            of weights and bias, or a Readout.
         timestep: control step [s]: inputs, feedback and records go at this pace.
         integrator: one of MuJoCo's: Euler, RK4, implicit, implicitfast, discrete; or leapfrog,
             of second order at Euler's cost (mcmj.leapfrog).

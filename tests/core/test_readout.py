@@ -78,7 +78,9 @@ def test_rows_keep_their_bits_whatever_is_beside_them(weights, bias):
 def test_copies_have_readouts_of_their_own(weights, bias):
     rows = np.stack([np.vstack([weights, bias]), np.vstack([2 * weights, 3 * bias])])
     signals = np.random.default_rng(3).normal(size=(2, 4, N))
-    both = Readout.from_rows(rows, N).outputs_by_row(signals)
+    readouts = Readout.from_rows(rows, N)
+    assert np.array_equal(readouts.rows, rows)
+    both = readouts.outputs_by_row(signals)
     for copy in range(2):
         alone = Readout.of(rows[copy], N, C).outputs_by_row(signals[copy])
         assert np.array_equal(both[copy], alone)
