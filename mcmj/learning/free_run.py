@@ -7,6 +7,7 @@ from mcmj.metrics import orbits
 from mcmj.simulation.simulation import Simulation
 from mcmj.targets.limit_cycles import Target
 from mcmj.utils.checkpoint import Checkpoint
+from mcmj.utils.errors import InvalidArgumentError
 from mcmj.utils.progress import OnSteps
 from mcmj.utils.validation import Array, require_number
 
@@ -18,6 +19,9 @@ def resume(simulation: Simulation, checkpoint: Checkpoint) -> tuple[Array, Fit |
 
     Returns:
         The outputs so far (T, n_outputs), and the fit if the readout was taught.
+
+    Raises:
+        CheckpointError: the checkpoint is damaged.
     """
     saved = checkpoint.load()
     if saved is None:
@@ -46,9 +50,16 @@ def free_run(
     Args:
         done: outputs of the steps that are done already; the chunks are the same either way.
         fit: kept in the checkpoint.
+
+    Raises:
+        DivergenceError: the body blew up.
+        InvalidArgumentError: the checkpoint does not hold what is done.
+        OutputError: the disk does not take it.
     """
     outputs = np.empty((steps, simulation.body.n_outputs))
     at = 0 if done is None else len(done)
+    if checkpoint is not None and checkpoint.rows != at:
+        raise InvalidArgumentError("checkpoint", f"one that holds {at} rows", checkpoint.rows)
     if done is not None:
         outputs[:at] = done
     if at == steps:
@@ -57,7 +68,7 @@ def free_run(
         new = part.get("outputs")
         outputs[at : at + len(new)] = new
         if checkpoint is not None:
-            checkpoint.save(_state(simulation, fit), new, at)
+            checkpoint.save(_state(simulation, fit), new)
         at += len(new)
         on_steps(len(new))
     return outputs

@@ -53,6 +53,10 @@ class OutputError(McmjError, OSError):
     """A folder or file that cannot be written."""
 
 
+class CheckpointError(McmjError, ValueError):
+    """A checkpoint that cannot be gone on from: damaged, or not readable."""
+
+
 class McmjWarning(UserWarning):
     """Base class of every warning that mcmj gives."""
 

@@ -7,7 +7,7 @@ import os
 import platform
 import shutil
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager, nullcontext, suppress
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
@@ -56,6 +56,8 @@ def prepare_folder(folder: str | Path) -> Path:
 def whole_file(path: str | Path, *, folder: bool = False) -> Iterator[Path]:
     """A temporary path beside `path` that takes its place if the block succeeds.
 
+    It is on the disk before it does: a machine that stops leaves the old file or the new one.
+
     Args:
         folder: for formats that are folders; the block gets an empty one to fill.
 
@@ -68,9 +70,13 @@ def whole_file(path: str | Path, *, folder: bool = False) -> Iterator[Path]:
         if folder:
             temporary.mkdir()
         yield temporary
+        for path_inside in temporary.rglob("*") if folder else ():
+            sync(path_inside)
+        sync(temporary)
         if folder:  # only an empty one can be replaced
             shutil.rmtree(final, ignore_errors=True)
         os.replace(temporary, final)
+        sync(final.parent)
     except OSError as error:
         raise OutputError(f"cannot write {final}: {error.strerror or error}") from error
     finally:
@@ -79,6 +85,20 @@ def whole_file(path: str | Path, *, folder: bool = False) -> Iterator[Path]:
                 shutil.rmtree(temporary, ignore_errors=True)
             else:
                 temporary.unlink(missing_ok=True)
+
+
+def sync(path: Path) -> None:
+    """Have a file or folder on the disk, as it is now, before this returns.
+
+    Raises:
+        OSError: the disk does not take it.
+    """
+    with suppress(OSError) if path.is_dir() else nullcontext():  # not all systems sync folders
+        handle = os.open(path, os.O_RDONLY if path.is_dir() else os.O_RDWR)
+        try:
+            os.fsync(handle)
+        finally:
+            os.close(handle)
 
 
 def write_text(path: str | Path, text: str) -> None:

@@ -13,7 +13,7 @@ from mcmj.metrics.orbits import orbit_error
 from mcmj.simulation import simulation
 from mcmj.targets.limit_cycles import target
 from mcmj.utils.checkpoint import Checkpoint
-from mcmj.utils.errors import InvalidArgumentError
+from mcmj.utils.errors import CheckpointError, InvalidArgumentError
 
 CONFIG = limit_cycle.Config(
     task="quadratic",
@@ -70,23 +70,115 @@ def test_an_interrupted_run_goes_on_bit_for_bit(small_chunks, tmp_path, parts):
     assert not list(tmp_path.iterdir())
 
 
-def test_a_checkpoint_of_something_else_or_a_damaged_one_is_not_used(tmp_path):
-    stem = tmp_path / "run"
-    outputs = np.arange(10.0).reshape(5, 2)
-    Checkpoint(stem, {"seed": 1}, 2).save({"x": np.ones(3)}, outputs[:3], 0)
-    Checkpoint(stem, {"seed": 1}, 2).save({"x": np.zeros(3)}, outputs[3:], 3)
-    arrays, found = Checkpoint(stem, {"seed": 1}, 2).load()
-    assert np.array_equal(found, outputs)
-    assert not arrays["x"].any()
-    assert Checkpoint(stem, {"seed": 2}, 2).load() is None
-    assert Checkpoint(tmp_path / "other", {"seed": 1}, 2).load() is None
+OUTPUTS = np.arange(12.0).reshape(6, 2)
+
+
+def checkpoint_in(folder, rows=6, seed=1):
+    """A checkpoint of two saves, as a process that goes on from it would open it."""
+    kept = Checkpoint(folder / "run", {"seed": seed}, 2)
+    kept.save({"x": np.ones(3)}, OUTPUTS[:3])
+    kept.save({"x": np.zeros(3)}, OUTPUTS[3:rows])
+    return Checkpoint(folder / "run", {"seed": seed}, 2)
+
+
+def test_a_checkpoint_gives_back_what_was_saved_last(tmp_path):
+    kept = checkpoint_in(tmp_path, rows=5)
     with (tmp_path / "run.outputs").open("ab") as file:
         file.write(b"half")  # interrupted while writing: the rows before count
-    assert np.array_equal(Checkpoint(stem, {"seed": 1}, 2).load()[1], outputs)
-    Checkpoint(stem, {"seed": 1}, 2).save({"x": np.zeros(3)}, outputs[:1], 5)
-    assert np.array_equal(Checkpoint(stem, {"seed": 1}, 2).load()[1][5:], outputs[:1])
-    (tmp_path / "run.npz").write_bytes(b"rubbish")
-    assert Checkpoint(stem, {"seed": 1}, 2).load() is None
+    arrays, found = kept.load()
+    assert np.array_equal(found, OUTPUTS[:5])
+    assert list(arrays) == ["x"]
+    assert not arrays["x"].any()
+    kept.save({"x": np.ones(3)}, OUTPUTS[5:])
+    assert np.array_equal(Checkpoint(tmp_path / "run", {"seed": 1}, 2).load()[1], OUTPUTS)
+
+
+def test_a_checkpoint_of_something_else_is_not_used(tmp_path):
+    checkpoint_in(tmp_path)
+    assert Checkpoint(tmp_path / "other", {"seed": 1}, 2).load() is None
+    other = Checkpoint(tmp_path / "run", {"seed": 2}, 2)
+    assert other.load() is None
+    other.save({}, OUTPUTS[:1])
+    assert np.array_equal(Checkpoint(tmp_path / "run", {"seed": 2}, 2).load()[1], OUTPUTS[:1])
+
+
+def test_a_run_that_is_killed_over_anothers_checkpoint_leaves_none(tmp_path, monkeypatch):
+    kept = checkpoint_in(tmp_path)
+    other = Checkpoint(tmp_path / "run", {"seed": 2}, 2)
+
+    def die(*_, **__):
+        raise StopError  # the outputs are written, the rest not yet
+
+    monkeypatch.setattr(np, "savez", die)
+    with pytest.raises(StopError):
+        other.save({}, OUTPUTS[:1])
+    assert kept.load() is None
+
+
+@pytest.mark.parametrize("suffix", ["npz", "outputs"])
+def test_every_damaged_byte_of_a_checkpoint_is_noticed(tmp_path, suffix):
+    kept = checkpoint_in(tmp_path)
+    arrays, _ = kept.load()
+    path = tmp_path / f"run.{suffix}"
+    whole, refused = path.read_bytes(), []
+    for k in range(len(whole)):
+        path.write_bytes(whole[:k] + bytes([whole[k] ^ 0xFF]) + whole[k + 1 :])
+        try:
+            found = kept.load()
+        except CheckpointError as error:
+            refused.append(str(error))
+        else:  # times and the like, in the frame of the ZIP file
+            assert np.array_equal(found[0]["x"], arrays["x"])
+            assert np.array_equal(found[1], OUTPUTS)
+    assert len(refused) > 0.7 * len(whole)
+    assert all("\n" not in text and text.endswith(": delete it to start anew") for text in refused)
+    if suffix == "outputs":
+        assert len(refused) == len(whole)
+
+
+@pytest.mark.parametrize("suffix", ["npz", "outputs"])
+@pytest.mark.parametrize("size", [None, 0, 1, -1])
+def test_a_checkpoint_with_something_missing_is_refused(tmp_path, suffix, size):
+    kept = checkpoint_in(tmp_path)
+    path = tmp_path / f"run.{suffix}"
+    content = path.read_bytes()
+    path.unlink()
+    if size is not None:
+        path.write_bytes(content[:size])
+    elif suffix == "npz":
+        assert kept.load() is None  # killed before the first one was whole
+        return
+    with pytest.raises(CheckpointError, match="is damaged"):
+        kept.load()
+
+
+def test_outputs_that_are_gone_are_never_filled_with_zeros(tmp_path):
+    kept = checkpoint_in(tmp_path)
+    kept.load()
+    path = tmp_path / "run.outputs"
+    path.write_bytes(path.read_bytes()[:-16])  # by something else, while the run is at work
+    with pytest.raises(CheckpointError, match="outputs are missing"):
+        kept.save({}, OUTPUTS[:1])
+    assert path.stat().st_size == OUTPUTS.nbytes - 16
+
+
+def test_a_run_does_not_go_on_from_a_damaged_checkpoint(small_chunks, tmp_path):
+    found = limit_cycle.get_body(CONFIG)
+    kept = limit_cycle.checkpoints(CONFIG, tmp_path, found)
+    with pytest.raises(StopError):
+        limit_cycle.run_tasks(CONFIG, found, kept, on_steps=stop_after(4))
+    (path,) = tmp_path.glob(".checkpoint-*.outputs")
+    damaged = bytearray(path.read_bytes())
+    damaged[100] ^= 1
+    path.write_bytes(damaged)
+    with pytest.raises(CheckpointError, match="SHA-256"):
+        limit_cycle.run_tasks(CONFIG, found, kept)
+
+
+def test_a_free_run_needs_the_checkpoint_of_what_is_done(tmp_path, body, w_out):
+    moving = simulation.Simulation(body, w_out=w_out)
+    with pytest.raises(InvalidArgumentError, match="checkpoint: expected one that holds 6 rows"):
+        free_run.free_run(moving, 10, done=OUTPUTS, checkpoint=Checkpoint(tmp_path / "run", {}, 2))
 
 
 def test_windows_of_a_drifting_orbit():

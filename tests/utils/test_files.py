@@ -1,6 +1,8 @@
 """Result files: whole or not there, readable without pickle, plain JSON."""
 
+import errno
 import json
+import os
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -53,6 +55,38 @@ def test_a_failure_leaves_what_was_there_and_nothing_else(tmp_path, error, befor
     assert [p.name for p in tmp_path.iterdir()] == (["a.txt"] if before else [])
     if before:
         assert path.read_text() == before
+
+
+@pytest.mark.parametrize("folder", [False, True])
+def test_a_file_is_on_the_disk_before_it_takes_its_name(tmp_path, monkeypatch, folder):
+    steps = []
+    fsync, replace = os.fsync, os.replace
+
+    def recorded(handle):
+        steps.append(os.fstat(handle).st_ino)
+        fsync(handle)
+
+    monkeypatch.setattr(os, "fsync", recorded)
+    monkeypatch.setattr(os, "replace", lambda a, b: (steps.append("replace"), replace(a, b)))
+    final = tmp_path / "a"
+    with whole_file(final, folder=folder) as temporary:
+        inside = temporary / "b" if folder else temporary
+        inside.write_text("text")
+    parts = [final / "b", final] if folder else [final]
+    inodes = [path.stat().st_ino for path in (*parts, tmp_path)]
+    assert steps == [*inodes[:-1], "replace", inodes[-1]]
+
+
+def test_a_disk_that_fails_late_is_an_output_error(tmp_path, monkeypatch):
+    def fail(handle):
+        raise OSError(errno.EIO, "Input/output error")
+
+    write_text(tmp_path / "a.txt", "old")
+    monkeypatch.setattr(os, "fsync", fail)
+    with pytest.raises(OutputError, match=r"a\.txt: Input/output error"):
+        write_text(tmp_path / "a.txt", "new")
+    assert (tmp_path / "a.txt").read_text() == "old"
+    assert [p.name for p in tmp_path.iterdir()] == ["a.txt"]
 
 
 def test_a_second_write_replaces_the_first(tmp_path):
