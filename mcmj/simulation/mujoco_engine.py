@@ -155,7 +155,6 @@ class Engine:
 
     def prepare(self, drive: Drive) -> None:
         """Set gates and clear old inputs before the first chunk of a drive."""
-        install.install(passive=self._passive)
         if self.body.n_outputs:
             gates = self._batch.expand("actuator_biasprm")[:, self.body.n_inputs :, 0]
             gates[:] = drive.gate
@@ -167,7 +166,9 @@ class Engine:
 
         Raises:
             DivergenceError: a copy blew up.
+            McmjError: another package's callback is installed.
         """
+        install.install(passive=self._passive)  # somebody may have taken them out since the last chunk
         batch, steps = self._batch, (stop - start) * self.substeps
         qpos, qvel = batch.bind("qpos").copy(), self._joint_velocities().copy()
         control, spec = self._control(drive, start, stop)

@@ -9,6 +9,7 @@ Two conventions hold under every integrator:
 
 import hashlib
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import fields, replace
 from functools import cached_property
 
@@ -26,7 +27,7 @@ from mcmj.simulation.damage import checked_cut, checked_masses
 from mcmj.simulation.engines import make_engine
 from mcmj.simulation.mujoco_engine import Engine
 from mcmj.simulation.stepsize.limit import warn_if_unstable
-from mcmj.utils.errors import DivergenceError, InvalidArgumentError, UnknownNameError
+from mcmj.utils.errors import DivergenceError, InvalidArgumentError, McmjError, UnknownNameError
 from mcmj.utils.validation import MOST_STEPS, Array, as_array, require_count
 
 CHUNK = 16384  # control steps at a time in C: 8 MB of lengths at 61 springs
@@ -57,6 +58,7 @@ class Simulation:
     """
 
     _copies: int | None = None  # an ensemble's arrays have a leading axis
+    _driven = False  # a stream has begun and is not at its end
 
     def __init__(
         self,
@@ -221,7 +223,12 @@ class Simulation:
         hook: Hook | None = None,
         chunk: int = CHUNK,
     ) -> Iterator[Trajectory]:
-        """As `rollout`, yielding chunks: memory stays flat however long the run is."""
+        """As `rollout`, yielding chunks: memory stays flat however long the run is.
+
+        Raises:
+            McmjError: another stream or rollout of this simulation begins before this one is at
+                its end or closed; also inside a hook.
+        """
         for name in record:
             if name not in RECORDABLE:
                 raise UnknownNameError("record", name, RECORDABLE)
@@ -261,15 +268,30 @@ class Simulation:
     def _chunks(
         self, drive: Drive, record: frozenset[str], hook: Hook | None, chunk: int
     ) -> Iterator[Trajectory]:
-        self._engine.prepare(drive)
-        for start in range(0, drive.steps, chunk):
-            stop = min(start + chunk, drive.steps)
-            now = _with_hook(drive, hook, start, self) if hook else drive
-            try:
-                chunk_run = self._run(now, record, start, stop)
-            except DivergenceError as error:
-                raise error.after(start) from None
-            yield chunk_run
+        with self._only_drive():
+            self._engine.prepare(drive)
+            for start in range(0, drive.steps, chunk):
+                stop = min(start + chunk, drive.steps)
+                now = _with_hook(drive, hook, start, self) if hook else drive
+                try:
+                    chunk_run = self._run(now, record, start, stop)
+                except DivergenceError as error:
+                    raise error.after(start) from None
+                yield chunk_run
+
+    @contextmanager
+    def _only_drive(self) -> Iterator[None]:
+        """Refuse a second drive: the engine holds the gate of one."""
+        if self._driven:
+            raise McmjError(
+                "a stream or rollout of this simulation is not at its end: finish it or close it "
+                "(stream.close()), or use a simulation each"
+            )
+        self._driven = True
+        try:
+            yield
+        finally:
+            self._driven = False
 
     def _run(self, drive: Drive, record: frozenset[str], start: int, stop: int) -> Trajectory:
         done = self._engine.steps_done

@@ -239,3 +239,44 @@ def test_a_simulation_reinstalls_what_was_uninstalled(body, w_bias):
     install.uninstall()
     second = simulation.rollout(10).lengths
     assert np.concatenate([first, second]).tobytes() == whole.tobytes()
+
+
+def take_out():
+    for name in CALLBACKS:
+        getattr(mujoco, f"set_{name}")(None)
+
+
+LOOPS = [{}, {"springs": "cubic"}, {"integrator": "leapfrog"}, {"feedback_delay": 2}]
+
+
+@pytest.mark.parametrize("options", LOOPS)
+def test_callbacks_taken_out_in_mid_stream_are_installed_again(no_callbacks, body, w_bias, options):
+    whole = Simulation(body, w_out=w_bias, **options).rollout(60, record=RECORD)
+    parts = []
+    for part in Simulation(body, w_out=w_bias, **options).stream(60, record=RECORD, chunk=20):
+        parts.append(part)
+        take_out()
+        if len(parts) == 2:  # one whose callbacks are others
+            Simulation(body, springs="cubic").rollout(5)
+    for name in RECORD:
+        pieces = np.concatenate([getattr(part, name) for part in parts])
+        assert pieces.tobytes() == getattr(whole, name).tobytes(), name
+
+
+def test_a_hook_may_take_callbacks_out(no_callbacks, body, w_bias):
+    whole = Simulation(body, w_out=w_bias, springs="cubic").rollout(20).lengths
+
+    def hook(time, lengths):
+        take_out()
+        return np.zeros(body.n_nodes)
+
+    hooked = Simulation(body, w_out=w_bias, springs="cubic").rollout(20, hook=hook).lengths
+    assert hooked.tobytes() == whole.tobytes()
+
+
+def test_a_foreign_callback_in_mid_stream_is_refused(no_callbacks, body, w_bias):
+    stream = Simulation(body, w_out=w_bias).stream(20, chunk=10)
+    next(stream)
+    mujoco.set_mjcb_act_bias(lambda model, data, actuator: 0.0)
+    with pytest.raises(McmjError, match="another mjcb_act_bias is installed"):
+        next(stream)

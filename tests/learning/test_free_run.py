@@ -115,13 +115,14 @@ def test_a_run_that_is_killed_over_anothers_checkpoint_leaves_none(tmp_path, mon
     assert kept.load() is None
 
 
-@pytest.mark.parametrize("suffix", ["npz", "outputs"])
-def test_every_damaged_byte_of_a_checkpoint_is_noticed(tmp_path, suffix):
+@pytest.mark.parametrize(("suffix", "stride"), [("npz", 11), ("outputs", 1)])
+def test_a_damaged_byte_of_a_checkpoint_is_noticed(tmp_path, suffix, stride):
     kept = checkpoint_in(tmp_path)
     arrays, _ = kept.load()
     path = tmp_path / f"run.{suffix}"
     whole, refused = path.read_bytes(), []
-    for k in range(len(whole)):
+    places = range(0, len(whole), stride)
+    for k in places:
         path.write_bytes(whole[:k] + bytes([whole[k] ^ 0xFF]) + whole[k + 1 :])
         try:
             found = kept.load()
@@ -130,10 +131,10 @@ def test_every_damaged_byte_of_a_checkpoint_is_noticed(tmp_path, suffix):
         else:  # times and the like, in the frame of the ZIP file
             assert np.array_equal(found[0]["x"], arrays["x"])
             assert np.array_equal(found[1], OUTPUTS)
-    assert len(refused) > 0.7 * len(whole)
+    assert len(refused) > 0.7 * len(places)
     assert all("\n" not in text and text.endswith(": delete it to start anew") for text in refused)
     if suffix == "outputs":
-        assert len(refused) == len(whole)
+        assert len(refused) == len(places)
 
 
 @pytest.mark.parametrize("suffix", ["npz", "outputs"])

@@ -9,7 +9,7 @@ from rollouts import ALL, VARIANTS, T, assert_same, exact_oscillator, join, part
 
 from mcmj import Body, Simulation
 from mcmj.simulation.simulation import CHUNK
-from mcmj.utils.errors import InvalidArgumentError
+from mcmj.utils.errors import DivergenceError, InvalidArgumentError, McmjError
 
 
 @pytest.mark.parametrize("options", VARIANTS)
@@ -99,3 +99,48 @@ def test_rollout_longer_than_a_chunk(oscillator):
     assert run.lengths.shape == (steps, 1)
     exact = exact_oscillator(oscillator, run.times[::500])[:, 0]
     assert np.abs(run.lengths[::500, 0] - 1.0 - exact).max() < 2e-3
+
+
+def still(time, lengths):
+    return np.zeros(8)
+
+
+@pytest.mark.parametrize("engine", ["mujoco", "twin"])
+@pytest.mark.parametrize("second", ["stream", "rollout"])
+def test_a_second_drive_in_mid_stream_is_refused(body, w_bias, engine, second):
+    """It would take the first one's gate; the first goes on to the bit."""
+    whole = Simulation(body, w_out=w_bias, engine=engine).rollout(40, gate=0.5)
+    simulation = Simulation(body, w_out=w_bias, engine=engine)
+    stream, parts = simulation.stream(40, gate=0.5, chunk=10), []
+    for run in stream:
+        parts.append(run.lengths)
+        if len(parts) < 4:
+            with pytest.raises(McmjError, match="not at its end"):
+                list(getattr(simulation, second)(5, gate=0.0))
+    assert np.concatenate(parts).tobytes() == whole.lengths.tobytes()
+    simulation.rollout(5)
+
+
+def test_a_drive_inside_a_hook_is_refused(body, w_out):
+    simulation = Simulation(body, w_out=w_out)
+
+    def hook(time, lengths):
+        simulation.rollout(1, gate=0.0)
+
+    with pytest.raises(McmjError, match="not at its end"):
+        simulation.rollout(5, hook=hook)
+    assert simulation.rollout(5, hook=still).lengths.shape == (5, body.n_springs)
+
+
+def test_a_stream_that_is_left_frees_its_simulation(body, w_out):
+    simulation = Simulation(body, w_out=w_out)
+    for _ in simulation.stream(40, chunk=10):
+        break
+    stream = simulation.stream(40, chunk=10)
+    simulation.rollout(1)  # it has not begun
+    next(stream)
+    stream.close()
+    with pytest.raises(DivergenceError):
+        simulation.rollout(2000, forces=np.full(body.n_nodes, 1e30))
+    simulation.reset()
+    simulation.rollout(1)
