@@ -48,6 +48,7 @@ class Experiment:
         film: film(result, folder), made last.
         show: show(result, console): tables for people.
         verdict: raises McmjError if the run did not do what was asked; all is written by then.
+        clean_up: removes what an interrupted run would have gone on from.
         needs_folder: the run itself writes into the folder of the results.
         resumes: it does, and an interrupted run goes on from what it left there.
     """
@@ -62,6 +63,7 @@ class Experiment:
     figures: Callable[[Any], Mapping[str, Figure]] = lambda result: {}
     film: Callable[[Any, Path], object] | None = None
     verdict: Callable[[Any], object] = lambda result: None
+    clean_up: Callable[[Any], object] = lambda result: None
     needs_folder: bool = False
     resumes: bool = False
 
@@ -92,6 +94,7 @@ def carry_out(experiment: Experiment, config: Any, output: Output, folder: Path)
     files.write_metrics(folder / "metrics.json", experiment.name, config, seed, result.metrics)
     for name, figure in experiment.figures(result).items():
         save(figure, folder / f"{name}.png")
+    experiment.clean_up(result)
     if output.video and experiment.film is not None:
         experiment.film(result, folder)
     if not output.quiet:

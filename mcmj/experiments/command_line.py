@@ -18,7 +18,7 @@ import mcmj
 from mcmj.experiments.base import Experiment, Output, carry_out
 from mcmj.experiments.registry import GROUPS, entries, experiment_named
 from mcmj.utils.errors import McmjError, McmjWarning
-from mcmj.utils.files import prepare_folder
+from mcmj.utils.files import only_run, prepare_folder
 
 LONGEST_NAME = 80  # of a folder
 
@@ -53,7 +53,8 @@ def command(experiment: Experiment, arguments: Sequence[str]) -> None:
     """Parse the options of an experiment, and carry it out."""
     config, output = parse(experiment, arguments)
     folder = prepare_folder(output.out or default_folder(experiment, config))
-    carry_out(experiment, config, replace(output, quiet=output.quiet or output.json), folder)
+    with only_run(folder):
+        carry_out(experiment, config, replace(output, quiet=output.quiet or output.json), folder)
     if output.json:
         document = json.loads((folder / "metrics.json").read_text(encoding="utf-8"))
         print(json.dumps(document["metrics"], indent=2))

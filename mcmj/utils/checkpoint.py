@@ -86,8 +86,9 @@ class Checkpoint:
         self._rows, self._hash = rows, running
 
     def remove(self) -> None:
-        """Delete both files."""
-        for path in (self._state, self._outputs):  # in this order: outputs alone are ignored
+        """Delete both files, and what killed runs left half-written."""
+        left = self._state.parent.glob(f".[0-9]*-{self._state.name}")
+        for path in (self._state, self._outputs, *left):  # in this order: outputs alone are ignored
             with suppress(OSError):
                 path.unlink(missing_ok=True)
 

@@ -8,6 +8,7 @@ import platform
 import shutil
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, nullcontext, suppress
+from contextvars import ContextVar
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
@@ -16,6 +17,12 @@ import numpy as np
 
 from mcmj.utils.errors import InvalidArgumentError, OutputError
 
+try:
+    import fcntl
+except ImportError:  # not a Unix
+    fcntl = None  # type: ignore[assignment]
+
+_LOCKED: ContextVar[frozenset[Path]] = ContextVar("_LOCKED", default=frozenset())
 _PACKAGES = ("mcmj", "mujoco", "numpy", "scipy", "numba")
 
 
@@ -50,6 +57,47 @@ def prepare_folder(folder: str | Path) -> Path:
     except OSError as error:
         raise OutputError(f"cannot write to the output folder {path}: {error.strerror}") from error
     return path
+
+
+@contextmanager
+def only_run(folder: str | Path) -> Iterator[None]:
+    """Keep other runs out of a folder, also those of other processes, until the block ends.
+
+    Blocks inside each other are one run. The lock goes with its process, however that ends.
+    Where the system or the disk has no such locks, nothing is locked.
+
+    Raises:
+        OutputError: another run is at work there, or there is no such folder.
+    """
+    path = Path(folder).resolve()
+    if path in _LOCKED.get() or fcntl is None:
+        yield
+        return
+    handle, token = _lock(path), _LOCKED.set(_LOCKED.get() | {path})
+    try:
+        yield
+    finally:
+        _LOCKED.reset(token)
+        os.close(handle)
+
+
+def _lock(folder: Path) -> int:
+    """Open a folder and lock it; closing it lets go."""
+    try:
+        handle = os.open(folder, os.O_RDONLY)
+    except OSError as error:
+        raise OutputError(f"cannot open the output folder {folder}: {error.strerror}") from error
+    try:
+        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        os.close(handle)
+        raise OutputError(
+            f"another run is at work in the output folder {folder}: wait for its end, or give "
+            "another folder"
+        ) from None
+    except OSError:
+        pass  # some network disks have no locks
+    return handle
 
 
 @contextmanager

@@ -2,32 +2,16 @@
 
 import json
 import signal
-import subprocess
-import sys
 import time
-from pathlib import Path
 
 import numpy as np
 import pytest
+from commands import run, start
 
 import mcmj
 from mcmj.mjcf.read import load_model, provenance_of_model, readouts_of_model
 
-SCRIPTS = Path(__file__).parents[2] / "scripts"
 SHORT = ["--duration", "8", "--washout", "2", "--free-run", "13", "--window", "12", "--no-video"]
-
-
-def start(name, *options, **popen):
-    return subprocess.Popen(
-        [sys.executable, SCRIPTS / f"{name}.py", *map(str, options)],
-        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, **popen,
-    )  # fmt: skip
-
-
-def run(name, *options):
-    process = start(name, *options)
-    out, err = process.communicate(timeout=240)
-    return process.returncode, out, err
 
 
 def metrics_of(folder):

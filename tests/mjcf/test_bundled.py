@@ -126,6 +126,5 @@ def test_a_body_file_is_read_once_a_run(tmp_path):
     result = limit_cycle.run(config, folder=kept, on_steps=lambda _: path.unlink(missing_ok=True))
     assert not path.exists()
     assert result.metrics["quadratic"]["orbit_error"] < 0.01
-    for checkpoint in result.checkpoints.values():
-        checkpoint.remove()
+    result.remove_checkpoints()
     assert not list(kept.iterdir())

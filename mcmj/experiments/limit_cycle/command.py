@@ -98,6 +98,7 @@ EXPERIMENT = Experiment(
     write=write,
     figures=figures,
     film=write_videos,
+    clean_up=Result.remove_checkpoints,
     needs_folder=True,
     resumes=True,
 )

@@ -2,6 +2,7 @@
 
 import hashlib
 from collections.abc import Mapping
+from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -19,6 +20,7 @@ from mcmj.simulation.simulation import Simulation
 from mcmj.targets.limit_cycles import Target, target
 from mcmj.utils.checkpoint import Checkpoint
 from mcmj.utils.errors import DivergenceError
+from mcmj.utils.files import only_run
 from mcmj.utils.progress import OnSteps
 from mcmj.utils.threads import in_threads
 from mcmj.utils.validation import Array
@@ -81,6 +83,11 @@ class Result:
         table["closed_loop_cost_ratio"] = self.closed_loop_cost_ratio
         return table
 
+    def remove_checkpoints(self) -> None:
+        """Delete them: once results are written, a run need not go on."""
+        for checkpoint in self.checkpoints.values():
+            checkpoint.remove()
+
 
 def checkpoints(config: Config, folder: Path, found: Found) -> dict[str, Checkpoint]:
     """Where the free runs of a config keep what they need to go on, one a task."""
@@ -98,17 +105,22 @@ def run(
     """Teach and run every task, and measure what the closed loop costs.
 
     Args:
-        folder: where checkpoints are kept, and gone on from; the result's may be removed.
+        folder: where checkpoints are kept, and gone on from, by one run at a time; see
+            Result.remove_checkpoints.
         on_steps: called with the number of steps done after every chunk, for progress bars.
 
     Raises:
         DivergenceError: a simulation blew up.
         BodyFileError, InvalidArgumentError: a body that cannot do the task.
+        CheckpointError: a checkpoint is damaged.
+        OutputError: another run is at work in the folder, or it cannot be written.
     """
     found = body, _, source = get_body(config)
     kept = {} if folder is None else checkpoints(config, folder, found)
+    with nullcontext() if folder is None else only_run(folder):
+        outcomes = run_tasks(config, found, kept, on_steps=on_steps)
     tasks = {}
-    for name, outcome in run_tasks(config, found, kept, on_steps=on_steps).items():
+    for name, outcome in outcomes.items():
         if isinstance(outcome, DivergenceError):
             raise outcome
         tasks[name] = outcome
