@@ -168,6 +168,7 @@ class TrunkWalker:
             DivergenceError: the robot blew up.
         """
         self._batch.bind("ctrl")[0] = 0.0 if commands is None else commands
+        install.install()  # as before every run: somebody may have taken them out
         with quiet_warnings():
             self._batch.step(nstep=steps, stage=_POSITION_STAGE)
         self._check_alive()
@@ -194,6 +195,7 @@ class TrunkWalker:
         pushes = max(1, round(PUSH_DURATION / (stride * self.timestep)))  # samples it lasts
         self._batch.bind("ctrl")[0] = 0.0
         rows: dict[str, list[Array]] = {}
+        install.install()
         for k in range(count):
             share = push / n / (pushes * stride * self.timestep)
             force[0, 0 : 2 * n : 2] = share if k < pushes else 0.0

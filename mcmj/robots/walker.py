@@ -146,6 +146,7 @@ class Walker:
 
     def advance(self, steps: int) -> None:
         """Go on for so many steps, recording nothing."""
+        install.install()  # as before every run: somebody may have taken them out
         with quiet_warnings():
             self._batch.step(nstep=steps)
 
@@ -173,6 +174,7 @@ class Walker:
         given = np.broadcast_to(np.asarray(0.0 if push is None else push), (self.copies, 2))
         impulse = as_array("push", given, (self.copies, 2))
         rows: dict[str, list[Array]] = {}
+        install.install()
         with quiet_warnings():
             for k in range(count):
                 force[:, :2] = impulse / PUSH_DURATION if k < pushed else 0.0
@@ -204,6 +206,7 @@ class Walker:
         control = commands @ self._law.commands.T
         control[..., self._feedback] += as_array("noise", noise, (self.copies, steps, len(LEGS)))
         self._hear(np.zeros_like(self._readout))
+        install.install()
         with quiet_warnings():
             sensors = self._batch.rollout(steps, control, _CTRL, ["sensordata"])["sensordata"]
         self._batch.ctrl = 0.0

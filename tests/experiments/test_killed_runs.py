@@ -1,5 +1,6 @@
 """One run a folder; runs that are killed at any moment go on to the bit."""
 
+import errno
 import json
 import os
 import signal
@@ -13,6 +14,7 @@ import pytest
 from commands import run, start
 
 from mcmj.experiments.limit_cycle import run as limit_cycle
+from mcmj.utils import files
 from mcmj.utils.errors import OutputError
 from mcmj.utils.files import only_run
 
@@ -54,6 +56,19 @@ def test_a_second_run_in_a_folder_is_refused_at_once(tmp_path):
 
 def test_no_lock_without_a_folder(tmp_path):
     with pytest.raises(OutputError, match="cannot open"), only_run(tmp_path / "nowhere"):
+        pass
+
+
+@pytest.mark.parametrize("missing", ["fcntl", "flock"])
+def test_where_there_are_no_locks_runs_go_on(tmp_path, monkeypatch, missing):
+    def fail(*_):
+        raise OSError(errno.ENOLCK, "No locks available")
+
+    if missing == "fcntl":
+        monkeypatch.setattr(files, "fcntl", None)
+    else:
+        monkeypatch.setattr(files.fcntl, "flock", fail)
+    with only_run(tmp_path):
         pass
 
 

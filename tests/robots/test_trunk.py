@@ -4,6 +4,7 @@ import mujoco
 import numpy as np
 import pytest
 
+from mcmj.core.callbacks import install
 from mcmj.experiments.trunk.run import forward_speed
 from mcmj.metrics.orbits import orbit_error
 from mcmj.robots.force_learning import ForceLearning, force_learn
@@ -198,3 +199,16 @@ def test_it_learns_to_trot_starts_from_rest_and_does_not_depend_on_the_step():
     assert max(errors) < 0.1
     assert min(paces) > 0.6
     assert paces[1] == pytest.approx(paces[0], rel=0.03)
+
+
+def test_a_walker_installs_callbacks_that_were_taken_out(trunk, lively):
+    def outputs(spoil):
+        walker = TrunkWalker(trunk, ground=False)
+        walker.set_readout(lively)
+        walker.close(True)
+        spoil()
+        walker.advance(100)
+        spoil()
+        return walker.walk(0.1).outputs
+
+    assert outputs(install.uninstall).tobytes() == outputs(lambda: None).tobytes()

@@ -6,6 +6,7 @@ import mujoco
 import numpy as np
 import pytest
 
+from mcmj.core.callbacks import install
 from mcmj.experiments.walk.config import Config
 from mcmj.experiments.walk.recover import distances_from, recovery
 from mcmj.mjcf.bundled import body_path
@@ -62,6 +63,17 @@ def test_the_robot_walks_and_the_body_does_not_know(body, trot):
     steps = round(walk.sample / walker.timestep)
     outputs = alone.rollout(len(walk.times) * steps + 1, record=("outputs",)).outputs
     assert np.abs(walk.outputs[0] - outputs[steps::steps]).max() < 1e-11
+
+
+def test_a_robot_installs_callbacks_that_were_taken_out(body, trot):
+    def joints(spoil):
+        walker = started(body, trot)
+        spoil()
+        walker.advance(1000)
+        spoil()
+        return walker.walk(0.2, joints=True).joints
+
+    assert joints(install.uninstall).tobytes() == joints(lambda: None).tobytes()
 
 
 @pytest.mark.parametrize("damage", ["cut_springs", "freeze"])
