@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from mcmj.search.database import TrialStore
-from mcmj.utils.errors import McmjError
+from mcmj.utils.extras import extra
 from mcmj.utils.files import whole_file
 
 
@@ -35,13 +35,11 @@ def write_parquet(store: TrialStore, path: str | Path) -> None:
     """The table as Parquet, whole or not at all.
 
     Raises:
-        McmjError: pyarrow is not installed.
+        MissingExtraError: pyarrow is not installed.
     """
-    try:
+    with extra("search", "Parquet needs pyarrow"):
         import pyarrow
         from pyarrow import parquet
-    except ImportError:
-        raise McmjError("Parquet needs pyarrow: pip install 'mcmj[search]'") from None
     columns = {name: _one_type(values) for name, values in table(store).items()}
     with whole_file(path) as temporary:
         parquet.write_table(pyarrow.table(columns), temporary)

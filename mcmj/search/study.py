@@ -11,7 +11,8 @@ from pathlib import Path
 from typing import Any
 
 from mcmj.search.space import Choices, Range, Space
-from mcmj.utils.errors import InvalidArgumentError, McmjError, OutputError
+from mcmj.utils.errors import InvalidArgumentError, OutputError
+from mcmj.utils.extras import extra
 
 Evaluate = Callable[[dict[str, object]], float]  # a setting -> its objective
 
@@ -28,7 +29,7 @@ class Study:
         maximise: large objectives are good.
 
     Raises:
-        McmjError: Optuna is not installed.
+        MissingExtraError: Optuna is not installed.
         OutputError: the file cannot be used.
         InvalidArgumentError: nothing is varied.
     """
@@ -37,11 +38,9 @@ class Study:
         self, path: str | Path, account: object, space: Space, seed: int, *, startup: int,
         maximise: bool,
     ) -> None:  # fmt: skip
-        try:
+        with extra("search", "a guided search needs Optuna"):
             import optuna
             from sqlalchemy.exc import SQLAlchemyError
-        except ImportError:
-            raise McmjError("a guided search needs Optuna: pip install 'mcmj[search]'") from None
         if not space:
             raise InvalidArgumentError("vary", "at least one field to choose", "none")
         self._optuna, self._space = optuna, dict(space)

@@ -13,6 +13,7 @@ from multiprocessing.connection import wait
 from typing import Any, Protocol, TypeVar
 
 from mcmj.utils.errors import InvalidArgumentError, McmjError
+from mcmj.utils.extras import extra
 from mcmj.utils.validation import require_count
 
 T = TypeVar("T")
@@ -102,15 +103,14 @@ class Cluster:
         scheduler: its address, as in tcp://host:8786.
 
     Raises:
-        McmjError: dask.distributed is not installed, or no scheduler answers.
+        MissingExtraError: dask.distributed is not installed.
+        McmjError: no scheduler answers.
         InvalidArgumentError: a cluster without workers.
     """
 
     def __init__(self, scheduler: str, *, patience: float = 30.0) -> None:
-        try:
+        with extra("cluster", "a cluster needs Dask"):
             from distributed import Client, KilledWorker
-        except ImportError:
-            raise McmjError("a cluster needs Dask: pip install 'mcmj[cluster]'") from None
         _check_answers(scheduler)
         try:
             self._client = Client(scheduler, timeout=patience, set_as_default=False)

@@ -168,7 +168,9 @@ class Engine:
             DivergenceError: a copy blew up.
             McmjError: another package's callback is installed.
         """
-        install.install(passive=self._passive)  # somebody may have taken them out since the last chunk
+        install.install(
+            passive=self._passive
+        )  # somebody may have taken them out since the last chunk
         batch, steps = self._batch, (stop - start) * self.substeps
         qpos, qvel = batch.bind("qpos").copy(), self._joint_velocities().copy()
         control, spec = self._control(drive, start, stop)

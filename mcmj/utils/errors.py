@@ -57,6 +57,14 @@ class CheckpointError(McmjError, ValueError):
     """A checkpoint that cannot be gone on from: damaged, or not readable."""
 
 
+class MissingExtraError(McmjError, ImportError):
+    """A package of one of mcmj's extras cannot be imported: says how to install it."""
+
+    def __init__(self, purpose: str, extra: str, reason: object) -> None:
+        self.extra = extra
+        super().__init__(f"{purpose}: pip install 'mcmj[{extra}]' ({reason})")
+
+
 class McmjWarning(UserWarning):
     """Base class of every warning that mcmj gives."""
 

@@ -8,11 +8,6 @@ that imports dm_control.
 from collections import OrderedDict
 
 import numpy as np
-from dm_control import mujoco
-from dm_control.rl import control
-from dm_control.suite import base
-from dm_control.utils import rewards
-from dm_env import specs
 
 from mcmj.core.body import Body
 from mcmj.core.callbacks import install
@@ -27,7 +22,15 @@ from mcmj.mjcf.write import to_mjcf
 from mcmj.simulation.stepsize.limit import warn_if_unstable
 from mcmj.targets.limit_cycles import Target
 from mcmj.utils.errors import InvalidArgumentError
+from mcmj.utils.extras import extra
 from mcmj.utils.validation import Array, as_array
+
+with extra("control", "environments need dm_control"):
+    from dm_control import mujoco
+    from dm_control.rl import control
+    from dm_control.suite import base
+    from dm_control.utils import rewards
+    from dm_env import specs
 
 RUNAWAY_LENGTH, RUNAWAY_OUTPUT = 10.0, 100.0  # of the body's size and the target's
 

@@ -5,13 +5,16 @@ gymnasium.make("mcmj.learning.environments.gymnasium_env:mcmj/Orbit-v0", name="q
 
 from typing import Any
 
-import gymnasium
 import numpy as np
-from gymnasium import spaces
 
 from mcmj.learning.environments.environment import Environment, load
 from mcmj.learning.environments.setting import Setting
+from mcmj.utils.extras import extra
 from mcmj.utils.validation import Array
+
+with extra("gym", "Gymnasium's environments need gymnasium"):
+    import gymnasium
+    from gymnasium import spaces
 
 ID = "mcmj/Orbit-v0"
 

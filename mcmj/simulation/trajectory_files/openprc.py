@@ -12,14 +12,17 @@ stiffness and damping.
 
 from pathlib import Path
 
-import h5py
 import numpy as np
 
 from mcmj.core.body import Body, spring_lengths
 from mcmj.core.trajectory import Trajectory
 from mcmj.utils.errors import InvalidArgumentError, TrajectoryFileError
+from mcmj.utils.extras import extra
 from mcmj.utils.files import whole_file
 from mcmj.utils.validation import Array
+
+with extra("files", "OpenPRC's files need h5py"):
+    import h5py
 
 _POSITIONS, _VELOCITIES = "time_series/nodes/positions", "time_series/nodes/velocities"
 

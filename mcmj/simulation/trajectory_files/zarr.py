@@ -10,11 +10,15 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import xarray
 
 from mcmj.core.trajectory import RECORDABLE, Trajectory
 from mcmj.utils.errors import InvalidArgumentError, TrajectoryFileError
+from mcmj.utils.extras import extra
 from mcmj.utils.files import whole_file
+
+with extra("files", "Zarr needs xarray and zarr"):
+    import xarray
+    import zarr
 
 _AXES = {
     "lengths": ("time", "spring"),

@@ -1,0 +1,41 @@
+"""Without a package of an extra there is one clear error, which says how to install it."""
+
+import subprocess
+import sys
+
+import pytest
+
+USE = """
+import sys
+sys.modules[{package!r}] = None  # as if it were not installed
+from mcmj.utils.errors import McmjError, MissingExtraError
+try:
+    {use}
+except MissingExtraError as error:
+    assert isinstance(error, McmjError)
+    print(error)
+"""
+STUDY = "from mcmj.search.study import Study; Study('s', {}, {'x': 1}, 0, startup=1, maximise=True)"
+
+
+@pytest.mark.parametrize(
+    ("package", "extra", "use"),
+    [
+        ("xarray", "files", "import mcmj.zarr_file"),
+        ("zarr", "files", "import mcmj.zarr_file"),
+        ("h5py", "files", "import mcmj.openprc_file"),
+        ("dm_control", "control", "import mcmj.environment"),
+        ("dm_env", "control", "import mcmj.environment"),
+        ("gymnasium", "gym", "import mcmj.gymnasium_env"),
+        ("optuna", "search", STUDY),
+        ("pyarrow", "search", "import mcmj.search.export as e; e.write_parquet(None, 't.parquet')"),
+        ("distributed", "cluster", "import mcmj.search.workers as w; w.Cluster('tcp://h:1')"),
+    ],
+)
+def test_a_missing_extra_gives_the_install_command(package, extra, use):
+    code = USE.format(package=package, use=use)
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert not done.stderr
+    assert f"pip install 'mcmj[{extra}]'" in done.stdout
+    assert package in done.stdout
+    assert done.stdout.count("\n") == 1
