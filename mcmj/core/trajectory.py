@@ -8,8 +8,8 @@ import numpy as np
 from mcmj.utils.errors import UnknownNameError
 from mcmj.utils.validation import Array
 
-_TIME_AXIS = {"lengths": -2, "outputs": -2, "positions": -3, "velocities": -3}
-RECORDABLE = tuple(_TIME_AXIS)
+TIME_AXIS = {"lengths": -2, "outputs": -2, "positions": -3, "velocities": -3}
+RECORDABLE = tuple(TIME_AXIS)
 
 
 @dataclass(frozen=True)
@@ -78,7 +78,7 @@ def join(parts: Sequence[Trajectory]) -> Trajectory:
 
     def whole(name: str) -> Array | None:
         pieces = [getattr(part, name) for part in parts]
-        return None if pieces[0] is None else np.concatenate(pieces, axis=_TIME_AXIS[name])
+        return None if pieces[0] is None else np.concatenate(pieces, axis=TIME_AXIS[name])
 
     if len(parts) == 1:
         return parts[0]

@@ -35,7 +35,7 @@ def test_the_documented_schema(run, body, tmp_path):
 def test_what_does_not_fit_is_said(run, body, tmp_path):
     with pytest.raises(InvalidArgumentError, match=r"positions \(T, N, 2\) of one run"):
         save_openprc(tmp_path / "s.h5", mcmj.Simulation(body).rollout(3), body)
-    with pytest.raises(TrajectoryFileError, match="cannot be read as HDF5"):
+    with pytest.raises(TrajectoryFileError, match="no such trajectory file"):
         load_openprc(tmp_path / "nowhere.h5")
     with h5py.File(tmp_path / "empty.h5", "w"):
         pass

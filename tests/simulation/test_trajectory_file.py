@@ -46,12 +46,14 @@ def test_everything_comes_back(path, run, body, w_out):
 def test_chunks_make_one_trajectory_and_replace_an_older_one(path, run, body, w_out):
     save_trajectory(path, run)
     simulation = mcmj.Simulation(body, w_out=w_out)
-    save_trajectory(path, simulation.stream(250, record=("outputs", "positions"), chunk=100))
+    parts = simulation.stream(250, record=("outputs", "positions"), chunk=100)
+    save_trajectory(path, parts, body=body, w_out=w_out, seed=7)
     stored = load_trajectory(path)
     assert np.array_equal(stored.trajectory.positions, run.positions)
     assert np.array_equal(stored.trajectory.times, run.times)
     assert stored.trajectory.lengths is None
-    assert stored.body is None
+    assert stored.body == body
+    assert stored.provenance["seed"] == 7
 
 
 def test_an_ensemble_has_an_axis_of_copies(path, body, w_out):

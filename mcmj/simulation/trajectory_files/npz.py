@@ -4,7 +4,7 @@ import json
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from zipfile import BadZipFile
+from zipfile import is_zipfile
 
 import numpy as np
 
@@ -12,6 +12,7 @@ from mcmj.core.body import Body
 from mcmj.core.trajectory import RECORDABLE, Trajectory, join
 from mcmj.mjcf.read import from_mjcf
 from mcmj.mjcf.write import to_mjcf
+from mcmj.simulation.trajectory_files.checks import check_body_fits, checked_trajectory, reading
 from mcmj.utils import files
 from mcmj.utils.errors import InvalidArgumentError, TrajectoryFileError
 from mcmj.utils.validation import Array
@@ -82,7 +83,9 @@ def load_trajectory(path: str | Path) -> StoredRun:
 
     Raises:
         InvalidArgumentError: another suffix.
-        TrajectoryFileError: no such file, or not a trajectory.
+        TrajectoryFileError: no such file, or not a whole trajectory of finite numbers.
+        BodyFileError: its body is none.
+        MissingExtraError: Zarr is not installed.
     """
     final = Path(path)
     _check_suffix(final)
@@ -94,9 +97,13 @@ def load_trajectory(path: str | Path) -> StoredRun:
         trajectory, xml, account = read_zarr(final)
     else:
         trajectory, xml, account = _read_npz(final)
-    if xml is not None and not xml.lstrip().startswith("<"):  # a path would be read
-        raise TrajectoryFileError(f"{final}: expected a body in MJCF, got {xml[:40]!r}")
-    body, w_out = (None, None) if xml is None else from_mjcf(xml)
+    if xml is None:
+        return StoredRun(trajectory, None, None, account)
+    if not isinstance(xml, str) or not xml.lstrip().startswith("<"):  # a path would be read
+        raise TrajectoryFileError(f"{final}: expected a body in MJCF, got {str(xml)[:40]!r}")
+    body, w_out = from_mjcf(xml)
+    with reading(final, "a run of its own body"):
+        check_body_fits(trajectory, body)
     return StoredRun(trajectory, body, w_out, account)
 
 
@@ -106,17 +113,16 @@ def _check_suffix(path: Path) -> None:
 
 
 def _read_npz(path: Path) -> tuple[Trajectory, str | None, dict[str, object]]:
-    try:
-        with np.load(path, allow_pickle=False) as file:
-            arrays = dict(file)
-    except (OSError, ValueError, EOFError, BadZipFile) as error:
-        raise TrajectoryFileError(f"{path}: not an NPZ file ({error})") from error
-    if "times" not in arrays:
-        raise TrajectoryFileError(
-            f"{path}: expected an array 'times' beside {', '.join(RECORDABLE)}, got "
-            f"{', '.join(sorted(arrays)) or 'nothing'}"
-        )
-    xml = str(arrays["body"]) if "body" in arrays else None
-    account = json.loads(str(arrays["provenance"])) if "provenance" in arrays else {}
-    recorded = {name: arrays[name] for name in RECORDABLE if name in arrays}
-    return Trajectory(arrays["times"], **recorded), xml, account
+    with reading(path, "an NPZ file of a trajectory"):
+        if not path.is_file() or not is_zipfile(path):  # a pipe would be waited for
+            raise TrajectoryFileError(f"{path}: not an NPZ file")
+        with path.open("rb") as opened, np.load(opened, allow_pickle=False) as file:
+            if "times" not in file:
+                raise TrajectoryFileError(
+                    f"{path}: expected an array 'times' beside {', '.join(RECORDABLE)}, got "
+                    f"{', '.join(sorted(file)) or 'nothing'}"
+                )
+            xml = str(file["body"]) if "body" in file else None
+            account = json.loads(str(file["provenance"])) if "provenance" in file else {}
+            recorded = {name: file[name] for name in RECORDABLE if name in file}
+            return checked_trajectory(file["times"], recorded), xml, account

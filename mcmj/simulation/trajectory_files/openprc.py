@@ -10,20 +10,23 @@ Bodies are not exchanged: OpenPRC's bars are linear, and its geometry.h5 has no 
 stiffness and damping.
 """
 
+import math
 from pathlib import Path
 
 import numpy as np
 
 from mcmj.core.body import Body, spring_lengths
 from mcmj.core.trajectory import Trajectory
+from mcmj.simulation.trajectory_files.checks import checked_trajectory, reading
 from mcmj.utils.errors import InvalidArgumentError, TrajectoryFileError
 from mcmj.utils.extras import extra
 from mcmj.utils.files import whole_file
-from mcmj.utils.validation import Array
+from mcmj.utils.validation import Array, as_array
 
 with extra("files", "OpenPRC's files need h5py"):
     import h5py
 
+_TIME = "time_series/time"
 _POSITIONS, _VELOCITIES = "time_series/nodes/positions", "time_series/nodes/velocities"
 
 
@@ -40,7 +43,7 @@ def save_openprc(path: str | Path, trajectory: Trajectory, body: Body) -> None:
     step = float(trajectory.times[1] - trajectory.times[0])
     strain = spring_lengths(positions, body.springs) / body.rest_lengths - 1.0
     arrays = {
-        "time_series/time": trajectory.times,
+        _TIME: trajectory.times,
         _POSITIONS: _with_z(positions),
         "time_series/elements/bars/strain": strain,
     }
@@ -56,27 +59,60 @@ def load_openprc(path: str | Path) -> Trajectory:
     """Read the times, positions and velocities of a planar simulation.h5.
 
     Raises:
-        TrajectoryFileError: no such file, not OpenPRC's, or nodes that leave the plane z = 0.
+        TrajectoryFileError: no such file, damaged, not OpenPRC's, one that leads to other files,
+            or nodes that leave the plane z = 0.
     """
-    try:
+    if not Path(path).is_file():  # a pipe would be waited for
+        raise TrajectoryFileError(f"no such trajectory file: {path}")
+    with reading(path, "a trajectory in HDF5"):
         with h5py.File(path, "r") as file:
-            arrays = {
-                name: file[name][:].astype(np.float64)
-                for name in ("time_series/time", _POSITIONS, _VELOCITIES)
-                if name in file
-            }
-    except OSError as error:
-        raise TrajectoryFileError(f"{path}: cannot be read as HDF5 ({error})") from error
-    if not {"time_series/time", _POSITIONS} <= arrays.keys():
-        raise TrajectoryFileError(f"{path}: expected time_series/time and {_POSITIONS} in it")
-    if np.abs(arrays[_POSITIONS][..., 2]).max(initial=0.0) > 0.0:
-        raise TrajectoryFileError(f"{path}: nodes leave the plane z = 0")
-    moving = arrays.get(_VELOCITIES)
-    return Trajectory(
-        arrays["time_series/time"],
-        positions=np.ascontiguousarray(arrays[_POSITIONS][..., :2]),
-        velocities=None if moving is None else np.ascontiguousarray(moving[..., :2]),
-    )
+            times, positions, velocities = (
+                _read(file, name) for name in (_TIME, _POSITIONS, _VELOCITIES)
+            )
+        if times is None or positions is None:
+            raise TrajectoryFileError(f"{path}: expected {_TIME} and {_POSITIONS} in it")
+        recorded = {"positions": _planar(positions)}
+        if velocities is not None:
+            recorded["velocities"] = _planar(velocities)
+        return checked_trajectory(times, recorded)
+
+
+def _read(file: h5py.File, name: str) -> Array | None:
+    """A dataset that lies in this file, whole; None if there is none of this name.
+
+    Raises:
+        TrajectoryFileError: it lies in another file, holds no numbers, or parts are missing.
+    """
+    place = file
+    for part in name.split("/"):
+        link = place.get(part, getlink=True)
+        if link is None:
+            return None
+        if not isinstance(link, h5py.HardLink):
+            raise TrajectoryFileError(f"{file.filename}: {name} is a link, maybe to another file")
+        place = place[part]
+    if place.is_virtual or place.external:
+        raise TrajectoryFileError(f"{file.filename}: {name} is stored in another file")
+    if place.dtype.kind not in "fiu":
+        raise TrajectoryFileError(f"{file.filename}: {name} holds no numbers")
+    if not _is_whole(place):  # HDF5 shows zeros there
+        raise TrajectoryFileError(f"{file.filename}: parts of {name} are missing")
+    return place[()].astype(np.float64)
+
+
+def _is_whole(dataset: h5py.Dataset) -> bool:
+    if dataset.chunks is None:
+        return dataset.id.get_storage_size() >= dataset.nbytes
+    chunks = [-(-n // size) for n, size in zip(dataset.shape, dataset.chunks, strict=True)]
+    return dataset.id.get_num_chunks() >= math.prod(chunks)
+
+
+def _planar(array: Array) -> Array:
+    """(T, N, 2) of (T, N, 3) with z = 0."""
+    spatial = as_array("nodes", array, (None, None, 3))
+    if np.abs(spatial[..., 2]).max(initial=0.0) > 0.0:
+        raise InvalidArgumentError("nodes", "the plane z = 0", "nodes that leave the plane")
+    return np.ascontiguousarray(spatial[..., :2])
 
 
 def _with_z(planar: Array) -> Array:

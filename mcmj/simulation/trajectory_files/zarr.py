@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from mcmj.core.trajectory import RECORDABLE, Trajectory
+from mcmj.simulation.trajectory_files.checks import checked_trajectory, reading
 from mcmj.utils.errors import InvalidArgumentError, TrajectoryFileError
 from mcmj.utils.extras import extra
 from mcmj.utils.files import whole_file
@@ -57,7 +58,8 @@ def from_dataset(dataset: xarray.Dataset) -> Trajectory:
             axes = _AXES[name]
             lead = ("copy",) if "copy" in dataset[name].dims else ()
             recorded[name] = np.ascontiguousarray(dataset[name].transpose(*lead, *axes).values)
-    return Trajectory(np.ascontiguousarray(dataset["time"].values), **recorded)
+    with reading("dataset", "a trajectory"):
+        return checked_trajectory(np.ascontiguousarray(dataset["time"].values), recorded)
 
 
 def write_zarr(
@@ -72,28 +74,42 @@ def write_zarr(
     first = next(parts, None)
     if first is None:
         raise InvalidArgumentError("run", "at least one chunk", "none")
-    dataset = to_dataset(first)
-    dataset.attrs["provenance"] = json.dumps(account)
-    if body is not None:
-        dataset.attrs["body"] = body
+    origin = {"provenance": json.dumps(account)} | ({} if body is None else {"body": body})
+
+    def dataset(part: Trajectory) -> xarray.Dataset:
+        return to_dataset(part).assign_attrs(origin)  # every part: appending replaces them
+
     with whole_file(path, folder=True) as temporary:
-        dataset.to_zarr(temporary, mode="w", consolidated=False, zarr_format=3)
+        dataset(first).to_zarr(temporary, mode="w", consolidated=False, zarr_format=3)
         for part in parts:
-            to_dataset(part).to_zarr(temporary, append_dim="time", consolidated=False)
+            dataset(part).to_zarr(temporary, append_dim="time", consolidated=False)
 
 
 def read_zarr(path: Path) -> tuple[Trajectory, str | None, dict[str, object]]:
     """The trajectory, the body as MJCF if there is one, and the account.
 
     Raises:
-        TrajectoryFileError: not a Zarr folder of a trajectory.
+        TrajectoryFileError: not a Zarr folder of a whole trajectory.
     """
-    try:
-        with xarray.open_zarr(path, consolidated=False) as dataset:
+    with reading(path, "a trajectory in Zarr"):
+        _check_whole(path)
+        with xarray.open_zarr(path, consolidated=False, zarr_format=3) as dataset:
             trajectory = from_dataset(dataset)
             account = json.loads(dataset.attrs.get("provenance", "{}"))
             return trajectory, dataset.attrs.get("body"), account
-    except (OSError, ValueError, KeyError) as error:
-        if isinstance(error, TrajectoryFileError):
-            raise
-        raise TrajectoryFileError(f"{path}: not a trajectory in Zarr ({error})") from error
+
+
+def _check_whole(path: Path) -> None:
+    """Zarr shows its fill value where a chunk is missing, and reads what a link leads to.
+
+    Raises:
+        TrajectoryFileError: a chunk is missing, an array holds no numbers, or a file is a link.
+    """
+    files = list(path.rglob("*"))
+    links = [file.name for file in files if file.is_symlink()]
+    if links:
+        raise TrajectoryFileError(f"{path}: {links[0]} is a link to another file")
+    for name, array in zarr.open_group(path, mode="r", zarr_format=3).arrays():
+        # the number of files first: a shape in a damaged file can mean 1e12 chunks to look for
+        if array.nchunks > len(files) or array.nchunks_initialized < array.nchunks:
+            raise TrajectoryFileError(f"{path}: chunks of {name!r} are missing")
