@@ -13,18 +13,23 @@ What is read of the structure, N masses, L springs, indices from 1:
 Matlab_Morphological_Computation_Simulation.) Mass is 1 there. Not read: noise, `info`.
 """
 
+import subprocess
+import sys
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
-from scipy.io import loadmat
-from scipy.io.matlab import MatReadError
 
 from mcmj.core.body import Body
 from mcmj.core.trajectory import State
-from mcmj.utils.errors import BodyFileError, InvalidArgumentError, UnknownNameError
+from mcmj.utils.errors import BodyFileError, UnknownNameError
 from mcmj.utils.validation import Array
+
+READER = Path(__file__).with_name("matread.py")
+PATIENCE = 60.0  # s: a net of a thousand springs takes less than one
 
 
 @dataclass(frozen=True)
@@ -49,24 +54,18 @@ class ToolboxNet:
 
 
 def load_toolbox_net(path: str | Path, name: str | None = None) -> ToolboxNet:
-    """Read a body from a .mat file of versions 4 to 7.
+    """Read a body from a .mat file of versions 4 to 7, in a process of its own.
 
     Args:
         name: of the variable; needed only if the file holds several nets.
 
     Raises:
-        BodyFileError: no such file, not a .mat file, or no net in it.
+        BodyFileError: no such file, not a .mat file, a damaged one, or no net in it.
         UnknownNameError: no net of that name, or several and no name.
     """
     if not Path(path).is_file():
         raise BodyFileError(f"no such .mat file: {path}")
-    try:
-        variables = loadmat(path, simplify_cells=True)
-    except NotImplementedError as error:
-        raise BodyFileError(f"{path}: HDF5 inside; in Matlab: save(.., 'net', '-v7')") from error
-    except (ValueError, OSError, TypeError, MatReadError) as error:
-        raise BodyFileError(f"{path}: not a .mat file ({error})") from error
-    nets = {key: value for key, value in variables.items() if _is_net(value)}
+    nets = {key: value for key, value in _variables(Path(path)).items() if _is_net(value)}
     if not nets:
         raise BodyFileError(f"{path}: no structure with the fields P and W of the toolbox")
     if name is None and len(nets) == 1:
@@ -75,9 +74,42 @@ def load_toolbox_net(path: str | Path, name: str | None = None) -> ToolboxNet:
         raise UnknownNameError("net", name, nets)
     try:
         return _read(nets[name])
-    except (KeyError, IndexError, InvalidArgumentError) as error:
+    except (KeyError, IndexError, ValueError, TypeError, AttributeError) as error:
         missing = f"no field {error}" if isinstance(error, KeyError) else str(error)
         raise BodyFileError(f"{path}: {name} is not a net of the toolbox: {missing}") from error
+
+
+def _variables(path: Path) -> dict[str, Any]:
+    """The file's structures as nested dictionaries of arrays and texts.
+
+    Raises:
+        BodyFileError: SciPy cannot read it, crashes on it, or hangs.
+    """
+    with TemporaryDirectory() as folder:
+        plain = Path(folder) / "plain.npz"
+        command = [sys.executable, "-P", str(READER), str(path), str(plain)]
+        try:
+            done = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE)
+        except subprocess.TimeoutExpired:
+            raise BodyFileError(f"{path}: not read after {PATIENCE:g} s; damaged?") from None
+        if done.returncode:
+            said = done.stderr.splitlines()[-1:] if done.returncode == 1 else []
+            reason = said[0] if said else f"its reader crashed ({done.returncode}); damaged?"
+            raise BodyFileError(f"{path}: {reason}")
+        with np.load(plain, allow_pickle=False) as file:
+            return _nested(file)
+
+
+def _nested(arrays: Mapping[str, np.ndarray]) -> dict[str, Any]:
+    """{"net": {"P": ..}} of {"net/P": ..}; text and single numbers as such."""
+    whole: dict[str, Any] = {}
+    for path, array in arrays.items():
+        *parents, name = path.split("/")
+        place = whole
+        for parent in parents:
+            place = place.setdefault(parent, {})
+        place[name] = array if array.ndim else array.item()
+    return whole
 
 
 def _is_net(value: object) -> bool:

@@ -7,6 +7,7 @@ import pytest
 from scipy.io import savemat
 
 import mcmj
+from mcmj.mjcf import toolbox_net
 from mcmj.mjcf.toolbox_net import load_toolbox_net
 from mcmj.reference.integration import integrate
 from mcmj.utils.errors import BodyFileError, UnknownNameError
@@ -100,3 +101,33 @@ def test_what_is_no_net_is_said(toolbox, tmp_path):
     savemat(tmp_path / "broken.mat", {"net": broken})
     with pytest.raises(BodyFileError, match="no field 'k3'"):
         load_toolbox_net(tmp_path / "broken.mat")
+
+
+@pytest.mark.parametrize(
+    ("place", "value", "said"),
+    [
+        (144, 5, "reader crashed"),  # the class of an array: SciPy follows a null pointer
+        (163, 127, "not a .mat file"),  # a size: 17 GB
+        (5000, None, "not a .mat file"),  # cut off
+    ],
+)
+def test_a_damaged_file_is_one_clear_error(place, value, said, toolbox, tmp_path):
+    savemat(tmp_path / "net.mat", {"net": net_structure(toolbox)})
+    data = bytearray((tmp_path / "net.mat").read_bytes())
+    if value is None:
+        del data[place:]
+    else:
+        data[place] = value
+    (tmp_path / "net.mat").write_bytes(data)
+    with pytest.raises(BodyFileError, match=said) as caught:
+        load_toolbox_net(tmp_path / "net.mat")
+    assert "\n" not in str(caught.value)
+
+
+def test_a_reader_that_hangs_is_not_waited_for(toolbox, tmp_path, monkeypatch):
+    savemat(tmp_path / "net.mat", {"net": net_structure(toolbox)})
+    (tmp_path / "slow.py").write_text("import time; time.sleep(60)")
+    monkeypatch.setattr(toolbox_net, "READER", tmp_path / "slow.py")
+    monkeypatch.setattr(toolbox_net, "PATIENCE", 0.5)
+    with pytest.raises(BodyFileError, match=r"not read after 0\.5 s"):
+        load_toolbox_net(tmp_path / "net.mat")
