@@ -28,7 +28,7 @@ from mcmj.core.trajectory import State
 from mcmj.utils.errors import BodyFileError, UnknownNameError
 from mcmj.utils.validation import Array
 
-READER = Path(__file__).with_name("matread.py")
+READER = Path(__file__).with_name("mat_reader.py")
 PATIENCE = 60.0  # s: a net of a thousand springs takes less than one
 
 
