@@ -1,26 +1,25 @@
-"""How a body looks in MuJoCo: the colours of the paper's Figs. 2 and 5m, camera, headlight."""
+"""How a body looks in MuJoCo: the colours of its nodes, camera, headlight."""
 
 import xml.etree.ElementTree as ET
 
 import numpy as np
-import numpy.typing as npt
 
 from mcmj.core.body import Body
+from mcmj.pictures.colours import (
+    FEEDBACK_COLOURS,
+    FIXED_COLOUR,
+    INPUT_COLOUR,
+    PLAIN_COLOUR,
+    SPRING_COLOUR,
+    Colour,
+)
 
-FIXED_COLOUR = (0.85, 0.10, 0.10)
-INPUT_COLOUR = (0.20, 0.70, 0.20)
-FEEDBACK_COLOURS = ((0.55, 0.20, 0.70), (0.10, 0.70, 0.75), (0.95, 0.60, 0.10), (0.90, 0.40, 0.65))
-PLAIN_COLOUR = (0.45, 0.45, 0.45)
-SPRING_COLOUR = (0.55, 0.58, 0.62)
-STRETCHED_COLOUR = (0.84, 0.15, 0.16)
-SHORTENED_COLOUR = (0.12, 0.31, 0.84)
-ARROW_COLOUR = (0.10, 0.10, 0.10)
 CAMERA_ANGLE = 30.0  # degrees; narrow: nodes far out are seen from above too
 NODE_SHARE, SPRING_SHARE = 0.014, 0.003  # radii, of the view
 MARGIN = 0.12  # of the body's larger side, around it
 
 
-def node_colour(body: Body, node: int) -> tuple[float, float, float]:
+def node_colour(body: Body, node: int) -> Colour:
     """Colour of a node by its role: fixed, input, fed back by output c, or none."""
     if body.fixed[node]:
         return FIXED_COLOUR
@@ -30,7 +29,7 @@ def node_colour(body: Body, node: int) -> tuple[float, float, float]:
     return INPUT_COLOUR if body.w_in[node].any() else PLAIN_COLOUR
 
 
-def node_kinds(body: Body) -> dict[str, tuple[float, float, float]]:
+def node_kinds(body: Body) -> dict[str, Colour]:
     """Names and colours of the roles that a body's nodes have, for a legend."""
     kinds = {"fixed": FIXED_COLOUR}
     if body.n_inputs:
@@ -85,10 +84,3 @@ def add_appearance(root: ET.Element, body: Body) -> None:
         pos=f"{cx:.9g} {cy:.9g} {distance:.9g}",
         fovy=f"{CAMERA_ANGLE:g}",
     )
-
-
-def strain_colours(strain: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
-    """Colours (..., L, 3) from strain (..., L) in [-1, 1]: blue if shortened, red if stretched."""
-    goal = np.where(strain[..., None] > 0, STRETCHED_COLOUR, SHORTENED_COLOUR)
-    weight = np.sqrt(np.abs(strain))[..., None]
-    return (1 - weight) * np.array(SPRING_COLOUR) + weight * goal

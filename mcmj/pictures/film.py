@@ -9,6 +9,7 @@ import numpy.typing as npt
 
 from mcmj.core.body import Body, spring_lengths
 from mcmj.mjcf.appearance import frame
+from mcmj.pictures.colours import strain_colours
 from mcmj.utils.errors import InvalidArgumentError
 from mcmj.utils.validation import Array, as_array, require_number
 
@@ -83,7 +84,7 @@ class Film:
 
     @cached_property
     def largest_strain(self) -> float:
-        """Of any spring at any time: (l - l0) / l0, where colours saturate; 0 at rest."""
+        """Of any spring at any time: (l - l0) / l0, where colours are full; 0 at rest."""
         largest = 0.0
         for chunk in np.array_split(self.positions, max(1, len(self.positions) // 1000)):
             largest = max(largest, float(np.abs(strains(self.body, chunk)).max(initial=0.0)))
@@ -94,10 +95,9 @@ class Film:
         rest = self.body.positions
         return rest + self.scale * (self.positions[index] - rest)
 
-    def relative_strains(self, index: int) -> Array:
-        """Strains (L,) over the largest one, in [-1, 1]."""
-        strain = strains(self.body, self.positions[index])
-        return strain / self.largest_strain if self.largest_strain > 0.0 else strain
+    def colours(self, index: int) -> Array:
+        """Of the springs by their strains (L, 3)."""
+        return strain_colours(strains(self.body, self.positions[index]), self.largest_strain)
 
     def arrows(self, index: int) -> Array:
         """Lengths (N,) [m] of the horizontal arrows as drawn, positive to the right."""

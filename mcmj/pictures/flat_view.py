@@ -7,14 +7,8 @@ from matplotlib.collections import LineCollection, PathCollection
 from matplotlib.figure import Figure
 
 from mcmj.core.body import Body
-from mcmj.mjcf.appearance import (
-    ARROW_COLOUR,
-    NODE_SHARE,
-    SPRING_SHARE,
-    frame,
-    node_colour,
-    strain_colours,
-)
+from mcmj.mjcf.appearance import NODE_SHARE, SPRING_SHARE, frame, node_colour
+from mcmj.pictures.colours import ARROW_COLOUR
 from mcmj.pictures.plotting import new_figure
 from mcmj.utils.validation import Array
 
@@ -49,16 +43,16 @@ class FlatView:
     def __exit__(self, *_: object) -> None:
         pass
 
-    def draw(self, positions: Array, strains: Array, arrows: Array) -> Picture:
-        """A picture (height, width, 3) of positions (N, 2), strains (L,) and arrows (N,)."""
+    def draw(self, positions: Array, colours: Array, arrows: Array) -> Picture:
+        """A picture (height, width, 3) of positions (N, 2), colours (L, 3) and arrows (N,)."""
         self._springs.set_segments(list(positions[self._body.springs]))
-        self._springs.set_color(list(strain_colours(strains)))
+        self._springs.set_color(list(colours))
         for nodes, markers in self._groups:
             markers.set_offsets(positions[nodes])
         self._arrows.set_offsets(positions)
         self._arrows.set_UVC(arrows, np.zeros_like(arrows))
         self._figure.canvas.draw()
-        pixels = np.asarray(self._figure.canvas.buffer_rgba())  # type: ignore[attr-defined]
+        pixels = np.array(self._figure.canvas.buffer_rgba())  # type: ignore[attr-defined]
         return pixels[..., :3]
 
 

@@ -14,31 +14,33 @@ from matplotlib.lines import Line2D
 
 from mcmj.core.body import Body
 from mcmj.metrics.orbits import ORBIT_POINTS
-from mcmj.mjcf.appearance import (
+from mcmj.mjcf.appearance import node_colour
+from mcmj.pictures.colours import (
+    BLACK,
+    BLUE,
     FEEDBACK_COLOURS,
     FIXED_COLOUR,
+    GROUP_COLOURS,
     INPUT_COLOUR,
     PLAIN_COLOUR,
-    node_colour,
+    TARGET_COLOUR,
 )
 from mcmj.targets.limit_cycles import Target
 from mcmj.utils.files import whole_file
 from mcmj.utils.validation import Array
 
-TARGET_COLOUR = "#d62728"  # the paper's red
 OUTPUT_STYLES: tuple[dict[str, Any], ...] = (
-    {"color": "black", "ls": "-"},
-    {"color": "#1f4fd6", "ls": "--"},
+    {"color": BLACK, "ls": "-"},
+    {"color": BLUE, "ls": "--"},
 )
-INTEGRATOR_STYLES = {  # colour, mark
-    "Euler": ("black", "o"),
-    "RK4": ("#1f4fd6", "D"),
-    "implicit": ("#8c6d31", "^"),
-    "implicitfast": ("#bda05a", "v"),
-    "discrete": ("#2a9d3a", "s"),
-    "leapfrog": ("#d62728", "o"),
+INTEGRATOR_MARKS = {
+    "Euler": "o",
+    "RK4": "D",
+    "implicit": "^",
+    "implicitfast": "v",
+    "discrete": "s",
+    "leapfrog": "o",
 }
-TASK_COLOURS = ("#1f4fd6", "black", "#2a9d3a")
 TITLES = {
     "van_der_pol": "Van der Pol",
     "quadratic": "Quadratic limit cycle",
@@ -153,7 +155,7 @@ def success_figure(orbit_errors: dict[str, Array], threshold: float) -> Figure:
     figure = new_figure(7.5, 4.2)
     axes = figure.add_subplot()
     top = 2.0  # everything worse, blow-ups too, is drawn here
-    for (name, errors), colour in zip(orbit_errors.items(), TASK_COLOURS, strict=False):
+    for (name, errors), colour in zip(orbit_errors.items(), GROUP_COLOURS, strict=False):
         good = int((errors < threshold).sum())
         axes.semilogy(
             np.arange(1, len(errors) + 1), np.sort(np.minimum(errors, top)), ".-", ms=4, lw=0.8,
@@ -174,7 +176,7 @@ def growth_figure(rows: Sequence[dict[str, float]]) -> Figure:
     figure = new_figure(9.0, 3.8)
     left, right = figure.subplots(1, 2)
     springs = [row["springs"] for row in rows]
-    for engine, colour in (("mujoco", "black"), ("twin", "#1f4fd6")):
+    for engine, colour in (("mujoco", BLACK), ("twin", BLUE)):
         costs = [row[f"{engine}_ns_per_spring_step"] for row in rows]
         left.loglog(springs, costs, "o-", color=colour, label=engine)
     left.set(xlabel="springs", ylabel="cost [ns per spring and step]")

@@ -6,34 +6,30 @@ so that they never depend on a driver.
 
 import time
 from collections.abc import Iterator, Mapping
-from contextlib import ExitStack, contextmanager
+from contextlib import AbstractContextManager, ExitStack, contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from statistics import median
 
-import imageio_ffmpeg
 import mediapy
 import numpy as np
-import numpy.typing as npt
 from PIL import Image
 
 from mcmj.core.body import Body
-from mcmj.pictures.caption import Caption
 from mcmj.pictures.film import Film
+from mcmj.pictures.film_figure import FilmFigure
 from mcmj.pictures.flat_view import FlatView
-from mcmj.pictures.opengl_view import GLView, RenderingUnavailableError
-from mcmj.pictures.panel import Panel
+from mcmj.pictures.opengl import RenderingUnavailableError
+from mcmj.pictures.opengl_view import GLView
+from mcmj.pictures.video_file import Picture, new_video
 from mcmj.targets.limit_cycles import Target
 from mcmj.utils.errors import InvalidArgumentError, UnknownNameError
 from mcmj.utils.files import whole_file
 from mcmj.utils.progress import OnSteps
 from mcmj.utils.validation import Array, require_count, require_number
 
-Picture = npt.NDArray[np.uint8]
-
 WIDTH, HEIGHT, PANEL_WIDTH = 640, 480, 384  # pixels of the body's picture; of the panel beside it
 RENDERERS = ("auto", "mujoco", "matplotlib")
-SUFFIXES = (".mp4", ".gif")
 GIF_SHARE = 2  # a GIF is so many times smaller and has so many times fewer frames
 ORBIT_POINTS = 1000  # of a target, as drawn
 
@@ -45,7 +41,7 @@ class Report:
     Attributes:
         backend: egl, osmesa, window system, or matplotlib.
         why_flat: why there is no OpenGL, if matplotlib had to do.
-        body_ms, frame_ms: of every picture of the body alone, and with panel and text [ms].
+        body_ms, frame_ms: of every picture of the body alone, and with axes and text [ms].
     """
 
     backend: str = ""
@@ -102,7 +98,7 @@ def body_view(
     body: Body, style: Style | None = None, *, width: int = WIDTH, height: int = HEIGHT,
     report: Report | None = None,
 ) -> Iterator[GLView | FlatView]:  # fmt: skip
-    """Something with `draw(positions, strains, arrows)`, see GLView.
+    """Something with `draw(positions, colours, arrows)`, see GLView.
 
     Raises:
         RenderingUnavailableError: MuJoCo's renderer was asked for, and there is no OpenGL.
@@ -129,16 +125,15 @@ def film_frames(
 ) -> Iterator[Picture]:
     """Frames (480, 1024, 3) of a film: the body at work, beside its outputs."""
     style, report = style or Style(), report or Report()
-    panel = Panel(film.times, film.outputs, film.orbit, film.windows, PANEL_WIDTH, HEIGHT)
-    caption = Caption(film, style.pace, (WIDTH, HEIGHT))
+    figure = FilmFigure(film, style.pace, WIDTH, HEIGHT, PANEL_WIDTH)
     with body_view(film.body, style, report=report) as view:
         for index in film.pick(style.fps, style.speed):
             start = time.perf_counter()
             picture = view.draw(
-                film.drawn_positions(index), film.relative_strains(index), film.arrows(index)
+                film.drawn_positions(index), film.colours(index), film.arrows(index)
             )
             drawn = time.perf_counter()
-            whole = np.hstack([caption.write(picture, index), panel.draw(int(index))])
+            whole = figure.draw(picture, int(index))
             report.body_ms.append(1e3 * (drawn - start))
             report.frame_ms.append(1e3 * (time.perf_counter() - start))
             yield whole
@@ -168,7 +163,7 @@ def write_film(
     with ExitStack() as stack:
         mp4 = stack.enter_context(_video(paths[".mp4"], style.fps, 1)) if ".mp4" in paths else None
         gif = (
-            stack.enter_context(_video(paths[".gif"], style.fps / GIF_SHARE, GIF_SHARE))
+            stack.enter_context(_video(paths[".gif"], style.fps, GIF_SHARE))
             if ".gif" in paths
             else None
         )
@@ -216,19 +211,9 @@ def limit_cycle_video(
     write_film(film, {".mp4": Path(path)})
 
 
-@contextmanager
-def _video(path: Path, fps: float, share: int) -> Iterator[mediapy.VideoWriter]:
-    """An open video file, MP4 or GIF by its suffix, of frames `share` times smaller."""
-    if path.suffix not in SUFFIXES:
-        raise InvalidArgumentError("path", f"a name that ends with {' or '.join(SUFFIXES)}", path)
-    mediapy.set_ffmpeg(imageio_ffmpeg.get_ffmpeg_exe())
-    shape = (HEIGHT // share, (WIDTH + PANEL_WIDTH) // share)
-    options = {"codec": "gif"} if path.suffix == ".gif" else {"crf": 23}
-    with (
-        whole_file(path) as temporary,
-        mediapy.VideoWriter(temporary, shape, fps=fps, **options) as video,
-    ):
-        yield video
+def _video(path: Path, fps: float, share: int) -> AbstractContextManager[mediapy.VideoWriter]:
+    """A video file of frames `share` times smaller, and so many times fewer."""
+    return new_video(path, (WIDTH + PANEL_WIDTH) // share, HEIGHT // share, fps=fps / share)
 
 
 def _numbered(stem: Path, number: int) -> Path:

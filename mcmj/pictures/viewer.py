@@ -18,9 +18,10 @@ import mujoco.viewer
 import numpy as np
 
 from mcmj.core.body import Body
-from mcmj.mjcf.appearance import CAMERA_ANGLE, frame, node_style, strain_colours
+from mcmj.mjcf.appearance import CAMERA_ANGLE, frame, node_style
 from mcmj.mjcf.read import load_model
 from mcmj.mjcf.write import to_mjcf
+from mcmj.pictures.colours import OUTPUT_COLOURS, strain_colours
 from mcmj.pictures.film import strains
 from mcmj.simulation.interactive import LiveLoop
 from mcmj.utils.errors import McmjError
@@ -33,7 +34,6 @@ PLOTS_SHIFT, HELP_SHIFT = 0.25, 0.08  # the body stands left of the plots, above
 SHOWN = 12.0  # seconds of outputs in the plot
 DRAG_STIFFNESS = 20.0  # of the spring between mouse and node [N/m]
 FREEZE_FIRST, FREEZE_SECOND, KICK, NEXT_READOUT, RESET = (ord(key) for key in "67890")
-_LINE_COLOURS = ((0.0, 0.0, 0.0), (0.12, 0.31, 0.84), (0.16, 0.62, 0.24), (0.88, 0.48, 0.0))
 HELP = {
     "6, 7": "freeze output x1, x2, or let go", "8": "kick all nodes", "9": "next readout",
     "0": "start again", "drag a node": "double click, then Ctrl + Shift + right button",
@@ -88,7 +88,7 @@ class Viewer:
         self._data = mujoco.MjData(self._model)
         self._bodies = {self._model.body(f"n{i}").id: int(i) for i in loop.body.free}
         self._keys: queue.SimpleQueue[int] = queue.SimpleQueue()
-        self._largest = 1e-12  # strain so far, for the colours
+        self._largest = 0.0  # strain so far, for the colours
         self._plots = Plots(loop.body.n_outputs)
         before = set(threading.enumerate())
         self._handle = mujoco.viewer.launch_passive(
@@ -172,7 +172,7 @@ class Viewer:
         with self._handle.lock():
             shift = self._scale * (positions - body.positions)
             self._data.qpos[:] = shift[body.free].ravel()
-            colours = strain_colours(strain / self._largest)
+            colours = strain_colours(strain, self._largest)
             self._model.tendon_rgba[: body.n_springs, :3] = colours
             mujoco.mj_fwdPosition(self._model, self._data)
         self._handle.sync()
@@ -241,7 +241,7 @@ def _figure(title: str) -> mujoco.MjvFigure:
     figure.panergba[:] = 1.0, 1.0, 1.0, 1.0
     figure.textrgb[:] = 0.0
     figure.gridrgb[:] = 0.8
-    figure.linergb[: len(_LINE_COLOURS)] = _LINE_COLOURS
+    figure.linergb[: len(OUTPUT_COLOURS)] = OUTPUT_COLOURS
     return figure
 
 

@@ -12,17 +12,19 @@ from PIL import Image
 
 import mcmj
 from mcmj.experiments.render import run as render
-from mcmj.mjcf.appearance import (
+from mcmj.mjcf.appearance import frame, node_colour
+from mcmj.pictures.colours import (
+    CHANGE_COLOUR,
     FIXED_COLOUR,
     SHORTENED_COLOUR,
     STRETCHED_COLOUR,
-    frame,
-    node_colour,
+    strain_colours,
 )
 from mcmj.pictures.film import Film, Window, deformation_scale, strains
+from mcmj.pictures.film_figure import FilmFigure
 from mcmj.pictures.flat_view import FlatView
-from mcmj.pictures.opengl_view import GLView, RenderingUnavailableError
-from mcmj.pictures.panel import WINDOW_COLOUR, Panel
+from mcmj.pictures.opengl import RenderingUnavailableError
+from mcmj.pictures.opengl_view import GLView
 from mcmj.pictures.rendering import (
     HEIGHT,
     PANEL_WIDTH,
@@ -71,7 +73,7 @@ def pixel(body, point):
 
 
 def rest(body):
-    return body.positions, np.zeros(body.n_springs), np.zeros(body.n_nodes)
+    return body.positions, strain_colours(np.zeros(body.n_springs), 0.0), np.zeros(body.n_nodes)
 
 
 def like(pixels, colour, tolerance=45):
@@ -91,7 +93,7 @@ def test_springs_are_red_where_stretched_and_blue_where_shortened(view, body):
     for sign, colour in ((1.0, STRETCHED_COLOUR), (-1.0, SHORTENED_COLOUR)):
         strained = np.zeros(body.n_springs)
         strained[3] = sign
-        picture = view.draw(body.positions, strained, np.zeros(body.n_nodes))
+        picture = view.draw(body.positions, strain_colours(strained, 1.0), np.zeros(body.n_nodes))
         row, column = pixel(body, body.positions[body.springs[3]].mean(axis=0))
         near = picture[row - 2 : row + 3, column - 2 : column + 3]
         assert like(near, colour).any()
@@ -101,9 +103,9 @@ def test_arrows_have_their_length(view, body):
     node, length = int(body.free[0]), 0.2 * max(frame(body)[2:])
     arrows = np.zeros(body.n_nodes)
     arrows[node] = length
-    changed = (view.draw(body.positions, np.zeros(body.n_springs), arrows)
-               .astype(int) - view.draw(*rest(body))).any(axis=-1)  # fmt: skip
-    columns = np.flatnonzero(changed.any(axis=0))
+    positions, colours, none = rest(body)
+    changed = view.draw(positions, colours, arrows) != view.draw(positions, colours, none)
+    columns = np.flatnonzero(changed.any(axis=(0, 2)))
     _, start = pixel(body, body.positions[node])
     _, tip = pixel(body, body.positions[node] + [length, 0.0])
     assert abs(columns.max() - tip) <= 4  # the arrow lies a little nearer to the camera
@@ -130,7 +132,9 @@ def test_scales(body, film):
     length = np.linalg.norm(film.positions[-1, a] - film.positions[-1, b])
     strain = strains(body, film.positions[-1])[0]
     assert strain == pytest.approx(length / body.rest_lengths[0] - 1.0, abs=1e-14)
-    assert np.abs([film.relative_strains(i) for i in range(200)]).max() == pytest.approx(1.0)
+    colours = np.array([film.colours(i) for i in range(200)])[..., None, :]
+    full = np.isclose(colours, [STRETCHED_COLOUR, SHORTENED_COLOUR], rtol=0, atol=1e-9)
+    assert full.all(axis=-1).sum() == 1  # one spring at one time: none saturates
     assert film.arrows(7).max() == pytest.approx(0.12 * largest)
     assert (film.label(49), film.label(50), film.label(100)) == ("", "pulled", "")
 
@@ -140,15 +144,25 @@ def test_speed(film, fps, speed, step):
     assert np.array_equal(film.pick(fps, speed), np.arange(0, 200, step))
 
 
-def test_the_panel_draws_itself_and_marks_the_window():
-    times = np.linspace(0.0, 10.0, 1001)
-    outputs = np.column_stack([np.cos(times), np.sin(times)])
-    panel = Panel(times, outputs, outputs[:628], [Window(2.0, 4.0, "")], PANEL_WIDTH, HEIGHT)
-    early, late = panel.draw(100), panel.draw(1000)
-    assert early.shape == (HEIGHT, PANEL_WIDTH, 3)
-    assert (early == WINDOW_COLOUR).all(axis=-1).sum() > 5000
-    dark = [(picture.sum(axis=-1) < 150).sum() for picture in (early, late)]
-    assert dark[1] > 2 * dark[0]
+def test_the_outputs_draw_themselves_and_the_window_is_marked(film):
+    figure = FilmFigure(film, "real time", WIDTH, HEIGHT, PANEL_WIDTH)
+    white = np.full((HEIGHT, WIDTH, 3), 255, np.uint8)
+    early, late = (figure.draw(white, index) for index in (10, 199))
+    assert early.shape == (HEIGHT, WIDTH + PANEL_WIDTH, 3)
+    shade = 0.15 * np.array(CHANGE_COLOUR) + 0.85  # 0.5 s of 2 s
+    assert 0.2 < like(early[400, WIDTH:], shade, 4).mean() < 0.3
+    dark = [(frame[:, WIDTH:].sum(axis=-1) < 150).sum() for frame in (early, late)]
+    assert dark[1] > dark[0]
+
+
+def test_words_lie_on_the_picture_of_the_body(film):
+    figure = FilmFigure(film, "real time", WIDTH, HEIGHT, PANEL_WIDTH)
+    grey = np.full((HEIGHT, WIDTH, 3), 128, np.uint8)
+    frame = figure.draw(grey, 0)[:, :WIDTH]
+    assert (frame[100:400] == 128).all()  # the middle is the picture
+    assert (frame <= 128).all()
+    assert (frame[-30:].max(axis=-1) < 30).any()  # time
+    assert like(frame[:60], np.minimum(STRETCHED_COLOUR, 0.5), 30).any()  # legend
 
 
 def decoded(path):

@@ -7,7 +7,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from mcmj.pictures.plotting import TASK_COLOURS, new_figure
+from mcmj.pictures.colours import GROUP_COLOURS
+from mcmj.pictures.plotting import new_figure
 from mcmj.utils.validation import Array
 
 NAMES = {
@@ -44,7 +45,7 @@ def capacity_figure(
 def _draw_delays(axes: Axes, by_delay: Mapping[int, Array]) -> None:
     longest = max(len(values) for values in by_delay.values())
     below = np.zeros(longest)
-    for (degree, values), colour in zip(by_delay.items(), TASK_COLOURS, strict=False):
+    for (degree, values), colour in zip(by_delay.items(), GROUP_COLOURS, strict=False):
         padded = np.pad(values, (0, longest - len(values)))
         label = f"degree {degree}: {padded.sum():.1f}"
         axes.bar(range(longest), padded, bottom=below, color=colour, width=0.8, label=label)

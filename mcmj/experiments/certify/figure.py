@@ -7,13 +7,12 @@ import numpy.typing as npt
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from mcmj.pictures.plotting import TARGET_COLOUR, TITLES, draw_phase_plane, new_figure
+from mcmj.pictures.colours import BLUE, ORANGE, TARGET_COLOUR
+from mcmj.pictures.plotting import TITLES, draw_phase_plane, new_figure
 from mcmj.targets.limit_cycles import Target
 from mcmj.utils.validation import Array
 
 Complex = npt.NDArray[np.complex128]
-BODY_COLOUR = "#1f4fd6"
-BLOWN_COLOUR = "#e08a00"
 
 
 def certificate_figure(
@@ -56,9 +55,7 @@ def certificate_figure(
 def _draw_multipliers(axes: Axes, body: Complex, target: Complex | None) -> None:
     circle = np.exp(1j * np.linspace(0, 2 * np.pi, 200))
     axes.plot(circle.real, circle.imag, color="0.6", lw=1)
-    axes.plot(
-        body.real, body.imag, "o", ms=5, color=BODY_COLOUR, mec="black", mew=0.4, label="body"
-    )
+    axes.plot(body.real, body.imag, "o", ms=5, color=BLUE, mec="black", mew=0.4, label="body")
     if target is not None:
         axes.plot(
             target.real, target.imag, "x", ms=9, mew=2, color=TARGET_COLOUR, label="target's system"
@@ -84,8 +81,8 @@ def _draw_starts(figure: Figure, axes: Axes, target: Target, first: Array, times
 
 
 def _draw_blows(axes: Axes, label: str, strengths: Array, good: Array, blown: Array) -> None:
-    axes.semilogx(strengths, good, "o-", color=BODY_COLOUR, label="recovered")
-    axes.semilogx(strengths, blown, "s--", color=BLOWN_COLOUR, ms=4, label="overflowed")
+    axes.semilogx(strengths, good, "o-", color=BLUE, label="recovered")
+    axes.semilogx(strengths, blown, "s--", color=ORANGE, ms=4, label="overflowed")
     axes.set(xlabel=label, ylabel="fraction", ylim=(-0.05, 1.05))
     axes.legend(frameon=False)
     axes.grid(alpha=0.3)

@@ -4,11 +4,11 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from mcmj.pictures.colours import BLUE, GREEN, RED
 from mcmj.pictures.plotting import OUTPUT_STYLES, TITLES, draw_phase_plane, new_figure
 from mcmj.targets.limit_cycles import Target
 from mcmj.utils.validation import Array
 
-INPUT_COLOUR = "#2a9d3a"
 Run = tuple[Array, Array, Array, float]
 
 
@@ -41,8 +41,8 @@ def _draw_learning(axes: Axes, rewards: Array, without: float) -> None:
     rounds = 1 + np.arange(len(rewards))
     axes.plot(rounds, rewards, ".", color="0.75", ms=4)
     axes.plot(rounds, rewards.max(axis=1), "o-", color="black", label="best of the round")
-    axes.plot(rounds, np.median(rewards, axis=1), "s--", color="#1f4fd6", label="median")
-    axes.axhline(without, color="#d62728", ls=":", label="without input")
+    axes.plot(rounds, np.median(rewards, axis=1), "s--", color=BLUE, label="median")
+    axes.axhline(without, color=RED, ls=":", label="without input")
     axes.set(xlabel="round", ylabel="mean reward of an episode", ylim=(0.0, 1.0))
     axes.set_title(f"cross-entropy method, {rewards.shape[1]} episodes a round")
     axes.legend(loc="lower right")
@@ -56,5 +56,5 @@ def _draw_run(axes: Axes, run: Run) -> None:
     if largest > 0.0:
         scaled = inputs * (np.abs(outputs).max() / largest)
         label = f"input (largest: {largest:.1f})"
-        axes.fill_between(times, scaled, color=INPUT_COLOUR, alpha=0.3, lw=0, label=label)
+        axes.fill_between(times, scaled, color=GREEN, alpha=0.3, lw=0, label=label)
     axes.set(ylabel="outputs", xlim=(0.0, times[-1]))

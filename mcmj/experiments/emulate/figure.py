@@ -9,13 +9,15 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from mcmj.core.integrators import INTEGRATORS
-from mcmj.pictures.plotting import (
-    INTEGRATOR_STYLES,
-    OUTPUT_STYLES,
+from mcmj.pictures.colours import (
+    BROWN,
+    GROUP_COLOURS,
+    INTEGRATOR_COLOURS,
+    LILAC,
+    PINK,
     TARGET_COLOUR,
-    TASK_COLOURS,
-    new_figure,
 )
+from mcmj.pictures.plotting import INTEGRATOR_MARKS, OUTPUT_STYLES, new_figure
 from mcmj.utils.validation import Array
 
 COLUMNS = 4
@@ -83,7 +85,7 @@ def _draw_errors(
     orders: Mapping[str, float | None],
 ) -> None:
     for name, steps in methods.items():
-        colour, mark = INTEGRATOR_STYLES[name]
+        colour, mark = INTEGRATOR_COLOURS[name], INTEGRATOR_MARKS[name]
         points = [(step, cell.error) for step, cell in sorted(steps.items())]
         good = np.array([p for p in points if np.isfinite(p[1])]).reshape(-1, 2)
         axes.loglog(
@@ -121,7 +123,7 @@ def diversity_figure(
     """
     figure = new_figure(13.5, 4.0)
     left, middle, right = figure.subplots(1, 3)
-    palette = [*TASK_COLOURS, "#9467bd", "#8c6d31", "#e377c2", "0.5"]
+    palette = [*GROUP_COLOURS, LILAC, BROWN, PINK, "0.5"]
     colours = dict(zip(sorted({*conditions, *errors}), itertools.cycle(palette)))
     for n, values in conditions.items():
         colour = colours[n]

@@ -5,7 +5,8 @@ from collections.abc import Collection, Mapping
 import numpy as np
 from matplotlib.figure import Figure
 
-from mcmj.pictures.plotting import OUTPUT_STYLES, TARGET_COLOUR, new_figure
+from mcmj.pictures.colours import TARGET_COLOUR
+from mcmj.pictures.plotting import OUTPUT_STYLES, new_figure
 from mcmj.utils.validation import Array
 
 SHOWN_SECONDS, SHOWN_SYMBOLS = 3.0, 80

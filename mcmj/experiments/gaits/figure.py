@@ -9,13 +9,12 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from mcmj.metrics.gaits import in_stance
-from mcmj.pictures.plotting import TARGET_COLOUR, best_phase, new_figure
+from mcmj.pictures.colours import BLACK, CHANGE_COLOUR, RECOVERED_COLOUR, TARGET_COLOUR, Colour
+from mcmj.pictures.plotting import best_phase, new_figure
 from mcmj.targets.gaits import LEGS
 from mcmj.targets.limit_cycles import Target
 from mcmj.utils.validation import Array
 
-SWITCH_COLOUR = "#e07b00"
-ARRIVED_COLOUR = "#1f4fd6"
 SPACING = 2.6  # between the legs' outputs, which are within +-1.1
 THIN = 10  # one sample in so many is drawn
 BAR = 0.36  # height of a stance bar
@@ -84,7 +83,7 @@ def gait_diagram(
         times = _times(last, 0, timestep)
         wanted = target.sample(times + best_phase(last, target, times))
         _bars(axes, times, wanted, TARGET_COLOUR, below=True)
-        _bars(axes, times, last, "black")
+        _bars(axes, times, last, BLACK)
         _legs(axes, title, (0.0, shown))
         axes.set_xlabel("time [s]" if place >= len(gaits) - 2 else "")
     for place, (title, switch) in enumerate(switches.items()):
@@ -93,7 +92,7 @@ def gait_diagram(
         times = _times(outputs, row, timestep)
         for wanted_times, wanted in _targets(switch, timestep):
             _bars(axes, wanted_times, wanted, TARGET_COLOUR, below=True)
-        _bars(axes, times, outputs, "black")
+        _bars(axes, times, outputs, BLACK)
         _legs(axes, f"{title}: {_when(arrival)}", _shown(after, times, arrival))
         _mark(axes, arrival)
     if switches:
@@ -136,7 +135,7 @@ def _targets(switch: Switch, timestep: float) -> list[tuple[Array, Array]]:
     return parts
 
 
-def _bars(axes: Axes, times: Array, outputs: Array, colour: str, *, below: bool = False) -> None:
+def _bars(axes: Axes, times: Array, outputs: Array, colour: Colour, *, below: bool = False) -> None:
     stance = in_stance(outputs)
     for leg in range(len(LEGS)):
         bottom = len(LEGS) - 1 - leg - (BAR if below else 0.0)
@@ -162,13 +161,13 @@ def _when(arrival: float) -> str:
 
 
 def _mark(axes: Axes, arrival: float) -> None:
-    axes.axvline(0.0, color=SWITCH_COLOUR, lw=1.8)
+    axes.axvline(0.0, color=CHANGE_COLOUR, lw=1.8)
     if np.isfinite(arrival):
-        axes.axvline(arrival, color=ARRIVED_COLOUR, lw=1.4, ls=":")
+        axes.axvline(arrival, color=RECOVERED_COLOUR, lw=1.4, ls=":")
 
 
 def _mark_handles() -> list[Line2D]:
     return [
-        Line2D([], [], color=SWITCH_COLOUR, lw=1.8, label="readout switched"),
-        Line2D([], [], color=ARRIVED_COLOUR, lw=1.4, ls=":", label="within 5 % from here on"),
+        Line2D([], [], color=CHANGE_COLOUR, lw=1.8, label="readout switched"),
+        Line2D([], [], color=RECOVERED_COLOUR, lw=1.4, ls=":", label="within 5 % from here on"),
     ]

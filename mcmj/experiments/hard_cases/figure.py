@@ -5,7 +5,8 @@ from collections.abc import Mapping
 import numpy as np
 from matplotlib.figure import Figure
 
-from mcmj.pictures.plotting import TARGET_COLOUR, TASK_COLOURS, new_figure
+from mcmj.pictures.colours import BLACK, BLUE, GREEN, TARGET_COLOUR
+from mcmj.pictures.plotting import new_figure
 
 PLAIN_STEP = 1e-3  # s: what a simulation takes unless told otherwise
 TOP = 2.0  # s: unbounded steps are drawn here
@@ -22,11 +23,11 @@ def step_figure(steps: Mapping[str, Mapping[str, tuple[float, float, float, floa
     for panel, (integrator, cases) in zip(axes, steps.items(), strict=True):
         rows = np.arange(len(cases))
         measured, at_rest, safe, blow_up = np.minimum(np.array(list(cases.values())).T, TOP)
-        panel.hlines(rows, safe, blow_up, color=TASK_COLOURS[0], alpha=0.35, lw=6,
+        panel.hlines(rows, safe, blow_up, color=BLUE, alpha=0.35, lw=6,
                      label="predicted in motion: safe to blow-up")  # fmt: skip
-        panel.plot(at_rest, rows, "|", color=TASK_COLOURS[2], ms=11, mew=2,
+        panel.plot(at_rest, rows, "|", color=GREEN, ms=11, mew=2,
                    label="predicted at rest")  # fmt: skip
-        panel.plot(measured, rows, "o", color=TASK_COLOURS[1], ms=4, label="measured")
+        panel.plot(measured, rows, "o", color=BLACK, ms=4, label="measured")
         panel.axvline(PLAIN_STEP, color=TARGET_COLOUR, ls="--", lw=1, label="1 ms")
         panel.set(xscale="log", title=integrator, xlim=(1e-8, 1.6 * TOP))
         panel.set_xticks([1e-7, 1e-5, 1e-3, 1e-1])

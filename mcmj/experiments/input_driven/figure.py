@@ -7,9 +7,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
+from mcmj.pictures.colours import BLUE, ORANGE, TARGET_COLOUR
 from mcmj.pictures.plotting import (
     OUTPUT_STYLES,
-    TARGET_COLOUR,
     best_phase,
     draw_outputs,
     draw_phase_plane,
@@ -18,7 +18,6 @@ from mcmj.pictures.plotting import (
 from mcmj.targets.limit_cycles import Target
 from mcmj.utils.validation import Array
 
-DOWN_COLOUR, UP_COLOUR = "#1f4fd6", "#e07b00"
 Curve = tuple[Array, Array, Array]  # inputs, amplitudes, frequencies [Hz]
 
 
@@ -38,7 +37,7 @@ def input_curves_figure(
     for quantity, (axes, label) in enumerate(zip(figure.subplots(1, 2), labels, strict=True), 1):
         axes.axvspan(*taught, color="0.93", lw=0, zorder=0)
         axes.semilogx(target[0], target[quantity], color=TARGET_COLOUR, lw=4, alpha=0.55)
-        for branch, colour, mark in zip(sweep, (DOWN_COLOUR, UP_COLOUR), "v^", strict=False):
+        for branch, colour, mark in zip(sweep, (BLUE, ORANGE), "v^", strict=False):
             axes.semilogx(branch[0], branch[quantity], mark, color=colour, ms=3.5, alpha=0.7, mew=0)
         axes.semilogx(held[0], held[quantity], "o", color="black", ms=6, mfc="white", mew=1.3)
         marks = [u for u in (0.1, 0.2, 0.5, 1, 2, 5, 10) if held[0][0] <= u <= held[0][-1]]
@@ -51,7 +50,7 @@ def input_curves_figure(
         Line2D([], [], color="black", ls="", marker="o", ms=6, mfc="white", mew=1.3,
                label="body, constant input"),
     ]  # fmt: skip
-    ways = (("v", DOWN_COLOUR, "body, sweep down"), ("^", UP_COLOUR, "body, sweep up"))
+    ways = (("v", BLUE, "body, sweep down"), ("^", ORANGE, "body, sweep up"))
     handles += [
         Line2D([], [], color=colour, ls="", marker=mark, ms=5, mew=0, label=name)
         for mark, colour, name in ways[: len(sweep)]

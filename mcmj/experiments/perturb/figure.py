@@ -8,11 +8,12 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from mcmj.metrics.orbits import ORBIT_POINTS
-from mcmj.pictures.plotting import OUTPUT_STYLES, TARGET_COLOUR, TITLES, new_figure
+from mcmj.pictures.colours import BLACK, CHANGE_COLOUR, RECOVERED_COLOUR, TARGET_COLOUR
+from mcmj.pictures.plotting import OUTPUT_STYLES, TITLES, new_figure
 from mcmj.targets.limit_cycles import Target
 from mcmj.utils.validation import Array
 
-PHASE_COLOURS = ("black", "#e07b00", "#1f4fd6")  # undisturbed, disturbed, free again
+PHASE_COLOURS = (BLACK, CHANGE_COLOUR, RECOVERED_COLOUR)  # undisturbed, disturbed, free again
 PHASE_NAMES = ("undisturbed", "disturbed", "free again")
 NAMES = {
     "frozen_x1": "Output $x_1$ frozen",
@@ -63,11 +64,11 @@ def _draw_run(
     plane.plot(*orbit[np.r_[:ORBIT_POINTS, 0]].T, color=TARGET_COLOUR, lw=3.5, alpha=0.55)
     if len(times):
         _, begin, end = (float(times[row]) for row in boundaries[:3])
-        time_axes.axvspan(begin, end, color=PHASE_COLOURS[1], alpha=0.15, lw=0)
+        time_axes.axvspan(begin, end, color=CHANGE_COLOUR, alpha=0.15, lw=0)
         if noisy:
             window = slice(boundaries[1], boundaries[2])
-            time_axes.plot(times[window], fed[window], color=PHASE_COLOURS[1], lw=0.3, alpha=0.25)
-            plane.plot(*fed[window].T, ",", color=PHASE_COLOURS[1], alpha=0.15)
+            time_axes.plot(times[window], fed[window], color=CHANGE_COLOUR, lw=0.3, alpha=0.25)
+            plane.plot(*fed[window].T, ",", color=CHANGE_COLOUR, alpha=0.15)
         for colour, first, last in zip(PHASE_COLOURS, boundaries, boundaries[1:], strict=False):
             rows = slice(first, last + 1)
             for c in range(2):
@@ -75,7 +76,7 @@ def _draw_run(
                                ls=OUTPUT_STYLES[c]["ls"])  # fmt: skip
             plane.plot(*outputs[rows].T, color=colour, lw=0.7)
         if np.isfinite(recovery):
-            time_axes.axvline(end + recovery, color=PHASE_COLOURS[2], lw=1, ls=":")
+            time_axes.axvline(end + recovery, color=RECOVERED_COLOUR, lw=1, ls=":")
         last_shown = end + max(shown, 1.3 * recovery if np.isfinite(recovery) else 0.0)
         time_axes.set_xlim(times[0], min(times[-1], last_shown))
     reach = 2.0 * np.abs(orbit).max(axis=0)  # noise may be larger than the picture
@@ -123,9 +124,9 @@ def swing_up_figure(runs: Mapping[str, tuple[Target, float, Array, float, float]
                            label=f"$x_{c + 1}$")  # fmt: skip
         plane.plot(*outputs[rows].T, color="black", lw=0.8)
         if len(times):
-            plane.plot(*outputs[0], "o", color=PHASE_COLOURS[1], ms=6)
+            plane.plot(*outputs[0], "o", color=CHANGE_COLOUR, ms=6)
         if arrived:
-            time_axes.axvline(swing_up, color=PHASE_COLOURS[1], lw=1.2, ls=":")
+            time_axes.axvline(swing_up, color=CHANGE_COLOUR, lw=1.2, ls=":")
         when = f"on the orbit after {swing_up:.1f} s" if arrived else "does not arrive"
         time_axes.set_title(f"{TITLES.get(name, name)}, from total rest: {when}")
         time_axes.set(ylabel="outputs")

@@ -13,7 +13,8 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullFormatter
 
 from mcmj.core.body import Body
-from mcmj.pictures.plotting import TARGET_COLOUR, TASK_COLOURS, TITLES, draw_body, new_figure
+from mcmj.pictures.colours import GROUP_COLOURS, TARGET_COLOUR
+from mcmj.pictures.plotting import TITLES, draw_body, new_figure
 from mcmj.utils.validation import Array
 
 _ORDERS = {
@@ -127,8 +128,8 @@ def best_bodies_figure(bodies: Sequence[tuple[Body, str]]) -> Figure:
 
 
 def _colours(count: int) -> list[Any]:
-    if count <= len(TASK_COLOURS):
-        return list(TASK_COLOURS[:count])
+    if count <= len(GROUP_COLOURS):
+        return list(GROUP_COLOURS[:count])
 
     return list(mpl.colormaps["viridis"](np.linspace(0.0, 0.9, count)))
 
@@ -154,7 +155,7 @@ def pruning_figure(
     figure = new_figure(11.5, 4.6)
     left, right = figure.subplots(1, 2, width_ratios=[1.35, 1.0])
     top = 3.0  # everything worse, blow-ups too, is drawn here
-    for (method, table), colour in zip(errors.items(), TASK_COLOURS, strict=False):
+    for (method, table), colour in zip(errors.items(), GROUP_COLOURS, strict=False):
         low, middle, high = np.quantile(np.minimum(table, top), (0.25, 0.5, 0.75), axis=0)
         left.loglog(
             counts, middle, "o-", ms=3.5, lw=1.3, color=colour, label=_ORDERS.get(method, method)

@@ -7,18 +7,19 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from mcmj.core.integrators import INTEGRATORS
-from mcmj.pictures.plotting import INTEGRATOR_STYLES, new_figure
+from mcmj.pictures.colours import GREY, INTEGRATOR_COLOURS, Colour
+from mcmj.pictures.plotting import INTEGRATOR_MARKS, new_figure
 
-STYLES = {
-    "mujoco_Euler_hook": ("0.5", "o:"),
-    "mujoco_RK4_hook": ("#8aa4ee", "D:"),
-    "twin_toolbox_euler": ("#9467bd", "x--"),
-    "twin_toolbox_rk": ("#e377c2", "+--"),
+STYLES = {  # integrator, whose colour it is, and marks; dashed: the twins
+    "mujoco_Euler_hook": ("Euler_hook", "o:"),
+    "mujoco_RK4_hook": ("RK4_hook", "D:"),
+    "twin_toolbox_euler": ("toolbox_euler", "x--"),
+    "twin_toolbox_rk": ("toolbox_rk", "+--"),
 }
-for _name, (_colour, _mark) in INTEGRATOR_STYLES.items():
-    STYLES[f"mujoco_{_name}"] = _colour, _mark + "-"
+for _name, _mark in INTEGRATOR_MARKS.items():
+    STYLES[f"mujoco_{_name}"] = _name, _mark + "-"
     if INTEGRATORS[_name].twin:
-        STYLES[f"twin_{INTEGRATORS[_name].twin}"] = _colour, _mark + "--"
+        STYLES[f"twin_{INTEGRATORS[_name].twin}"] = _name, _mark + "--"
 COLUMNS = 4
 
 
@@ -50,7 +51,7 @@ def work_precision_figure(
         _draw_body(axes, body, methods)
     handles, labels = [], []
     for method in next(iter(cells.values())):
-        colour, style = STYLES.get(method, ("0.7", ".-"))
+        colour, style = _style(method)
         (line,) = grid[-1].plot([], [], style, color=colour, ms=4)
         order = orders.get(method)
         slope = f"  (order {order.slope:.1f})" if order is not None else ""  # type: ignore[attr-defined]
@@ -64,7 +65,7 @@ def work_precision_figure(
 
 def _draw_body(axes: Axes, body: str, methods: Mapping[str, Mapping[float, Point]]) -> None:
     for method, steps in methods.items():
-        colour, style = STYLES.get(method, ("0.7", ".-"))
+        colour, style = _style(method)
         good = [(cell.cost_ratio, cell.error) for cell in steps.values() if cell.error < 1.0]
         if good:
             costs, errors = zip(*good, strict=True)
@@ -73,3 +74,8 @@ def _draw_body(axes: Axes, body: str, methods: Mapping[str, Mapping[float, Point
     axes.set(xlabel="cost / Euler at 1 ms", ylabel="relative position error", ylim=(1e-13, 1.0))
     axes.set_title(body.replace("_", " "))
     axes.grid(alpha=0.25)
+
+
+def _style(method: str) -> tuple[Colour, str]:
+    integrator, marks = STYLES.get(method, ("", ".-"))
+    return INTEGRATOR_COLOURS.get(integrator, GREY), marks

@@ -7,14 +7,14 @@ from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 
 from mcmj.experiments.walk.figure import draw_stance
-from mcmj.pictures.plotting import TARGET_COLOUR, best_phase, new_figure
+from mcmj.pictures.colours import MUSCLE_COLOUR, TARGET_COLOUR
+from mcmj.pictures.plotting import OUTPUT_STYLES, best_phase, new_figure
 from mcmj.robots.trunk import Trunk
 from mcmj.robots.walk_metrics import Walk
 from mcmj.targets.gaits import LEGS
 from mcmj.targets.limit_cycles import Target
 
 PERIODS = 3.0  # of each gait that are shown
-MUSCLE = "#7d3b9e"
 
 
 def trunk_figure(trunk: Trunk, walks: Mapping[str, tuple[Target, Walk]]) -> Figure:
@@ -50,7 +50,9 @@ def draw_trunk_body(axes: Axes, trunk: Trunk) -> None:
     lines = list(body.positions[body.springs])
     springs, muscles = lines[: trunk.n_sensed], lines[trunk.n_sensed :]
     axes.add_collection(LineCollection(springs, colors="0.55", lw=1.0, label="springs, sensed"))
-    axes.add_collection(LineCollection(muscles, colors=MUSCLE, lw=2.2, label="muscles, driven"))
+    axes.add_collection(
+        LineCollection(muscles, colors=MUSCLE_COLOUR, lw=2.2, label="muscles, driven")
+    )
     axes.plot(*body.positions[:n].T, "o", color="0.3", ms=4)
     axes.plot(*body.positions[n:].T, "o", color="black", ms=7, label="feet")
     axes.axhline(-trunk.settings.foot, color="0.4", lw=1.5)
@@ -67,11 +69,10 @@ def _commands(axes: Axes, name: str, target: Target, walk: Walk) -> None:
     outputs = walk.outputs[0]
     phase = best_phase(outputs, target, times)
     wanted = target.sample(times + phase)
-    styles = (("black", "-"), ("#1f4fd6", "--"))
-    for muscle, (colour, style) in enumerate(styles):
+    for muscle, style in enumerate(OUTPUT_STYLES):
         axes.plot(times, 1e3 * wanted[:, muscle], color=TARGET_COLOUR, lw=3, alpha=0.5,
                   label="target" if muscle == 0 else None)  # fmt: skip
         label = f"LF, {('fore', 'rear')[muscle]} muscle"
-        axes.plot(times, 1e3 * outputs[:, muscle], style, color=colour, lw=1.2, label=label)
+        axes.plot(times, 1e3 * outputs[:, muscle], **style, lw=1.2, label=label)
     axes.set(title=name, xlim=(0, times[-1]))
     axes.spines[["right", "top"]].set_visible(False)

@@ -7,12 +7,13 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from mcmj.pictures.colours import BLUE, GREEN, ORANGE, RED
 from mcmj.pictures.plotting import new_figure
 from mcmj.robots.walk_metrics import Walk
 from mcmj.targets.gaits import LEGS
 from mcmj.utils.validation import Array
 
-COLOURS = ("#1f4fd6", "#2a9d3a", "#d62728", "#e07b00")
+COLOURS = (BLUE, GREEN, RED, ORANGE)
 BAR = 0.7
 STYLES: dict[str, dict[str, Any]] = {  # of stages without and with the ground in the body
     "uncoupled": {"color": "0.55", "marker": "s", "ms": 4, "ls": "--"},

@@ -1,0 +1,38 @@
+"""Video files, MP4 or GIF, whole or not at all."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import imageio_ffmpeg
+import mediapy
+import numpy as np
+import numpy.typing as npt
+
+from mcmj.utils.errors import InvalidArgumentError
+from mcmj.utils.files import whole_file
+
+Picture = npt.NDArray[np.uint8]  # (height, width, 3)
+OPTIONS: dict[str, dict[str, Any]] = {".mp4": {"crf": 23}, ".gif": {"codec": "gif"}}  # of ffmpeg
+
+
+@contextmanager
+def new_video(
+    path: str | Path, width: int, height: int, *, fps: float
+) -> Iterator[mediapy.VideoWriter]:
+    """A video file to which `add_image(picture)` adds a picture of so many pixels.
+
+    Raises:
+        InvalidArgumentError: neither .mp4 nor .gif.
+        OutputError: the file cannot be written.
+    """
+    suffix = Path(path).suffix
+    if suffix not in OPTIONS:
+        raise InvalidArgumentError("path", f"a name that ends with {' or '.join(OPTIONS)}", path)
+    mediapy.set_ffmpeg(imageio_ffmpeg.get_ffmpeg_exe())
+    with (
+        whole_file(path) as temporary,
+        mediapy.VideoWriter(temporary, (height, width), fps=fps, **OPTIONS[suffix]) as video,
+    ):
+        yield video
