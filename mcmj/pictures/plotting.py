@@ -11,6 +11,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
+from matplotlib.ticker import MaxNLocator
 
 from mcmj.core.body import Body
 from mcmj.metrics.orbits import ORBIT_POINTS
@@ -41,6 +42,9 @@ INTEGRATOR_MARKS = {
     "discrete": "s",
     "leapfrog": "o",
 }
+
+
+TARGET_STYLE: dict[str, Any] = {"color": TARGET_COLOUR, "lw": 3.0, "alpha": 0.55}
 TITLES = {
     "van_der_pol": "Van der Pol",
     "quadratic": "Quadratic limit cycle",
@@ -88,22 +92,45 @@ def draw_body(axes: Axes, body: Body) -> None:
 
 
 def draw_outputs(axes: Axes, times: Array, outputs: Array, wanted: Array) -> None:
-    """Outputs (T, n) over time on their targets; times [s]."""
+    """Outputs (T, n) over time on their targets, T >= 2; times [s]."""
     for c in range(outputs.shape[1]):
-        axes.plot(times, wanted[:, c], color=TARGET_COLOUR, lw=3.0, alpha=0.55)
+        axes.plot(times, wanted[:, c], **TARGET_STYLE)
         axes.plot(times, outputs[:, c], lw=1.3, **OUTPUT_STYLES[c % 2], label=f"$x_{c + 1}$")
-    axes.set(xlabel="time in closed loop [s]", xlim=(times[0], times[-1]))
+    axes.set(xlabel="time in closed loop [s]", xlim=(times[0], 2 * times[-1] - times[-2]))
+    axes.locator_params(axis="x", nbins=5)
+
+
+def output_handles(n_outputs: int) -> list[Line2D]:
+    """For a legend: the target and the outputs."""
+    return [
+        Line2D([], [], **TARGET_STYLE, label="target"),
+        *(
+            Line2D([], [], **OUTPUT_STYLES[c % 2], label=f"output $x_{c + 1}$")
+            for c in range(n_outputs)
+        ),
+    ]
 
 
 def draw_phase_plane(axes: Axes, outputs: Array, target: Target) -> None:
     """The generated orbit (first two outputs) on the target's."""
-    orbit = target.orbit(ORBIT_POINTS)
-    closed = np.vstack([orbit, orbit[:1]])
-    axes.plot(closed[:, 0], closed[:, 1], color=TARGET_COLOUR, lw=3.5, alpha=0.55)
+    draw_orbit(axes, target)
     axes.plot(outputs[:, 0], outputs[:, 1], color="black", lw=0.8)
-    axes.set(aspect="equal", xlabel="$x_1$", ylabel="$x_2$")
+
+
+def draw_orbit(axes: Axes, target: Target) -> None:
+    """The target's orbit in the phase plane of the first two outputs, as wide as it is high."""
+    orbit = target.orbit(ORBIT_POINTS)
+    axes.plot(*orbit[np.r_[:ORBIT_POINTS, 0], :2].T, **TARGET_STYLE)
+    axes.set(xlabel="$x_1$", ylabel="$x_2$")
+    # by its limits: a box as narrow as some orbits has no room for ticks
+    axes.set_aspect("equal", adjustable="datalim")
     axes.margins(0.12)
-    axes.locator_params(axis="x", nbins=4)
+    axes.locator_params(nbins=5)
+
+
+def count_in_whole_numbers(axes: Axes) -> None:
+    """Ticks of an x axis that counts: there are no 1.25 bodies."""
+    axes.xaxis.set_major_locator(MaxNLocator(integer=True))
 
 
 def limit_cycle_figure(
@@ -131,6 +158,7 @@ def limit_cycle_figure(
         shift = best_phase(end, target, times[-shown:])
         draw_outputs(last, times[-shown:] - start, end, target.sample(times[-shown:] + shift))
         draw_phase_plane(plane, end, target)
+        first.set_ylabel("outputs")
         first.set_title(f"{TITLES.get(target.name, target.name)}: loop closed at 0 s")
         last.set_title(f"last {window:g} s of {free_run:g} s (target moved by {shift:+.2f} s)")
         plane.set_title(
@@ -138,13 +166,7 @@ def limit_cycle_figure(
             f"period error {100 * errors['period_error']:.3f} %"
         )
         if row == 0:
-            handles = [
-                Line2D([], [], color=TARGET_COLOUR, lw=3, alpha=0.55, label="target"),
-                *(
-                    Line2D([], [], **OUTPUT_STYLES[c % 2], label=f"output $x_{c + 1}$")
-                    for c in range(outputs.shape[1])
-                ),
-            ]
+            handles = output_handles(outputs.shape[1])
             figure.legend(handles=handles, loc="outside upper center", ncols=3, frameon=False)
     draw_body(figure.add_subplot(grid[:, 3]), body)
     return figure
@@ -168,6 +190,7 @@ def success_figure(orbit_errors: dict[str, Array], threshold: float) -> Figure:
     axes.set(xlabel="body, sorted by error (each task for itself)", ylabel="orbit error")
     axes.legend(frameon=False)
     axes.grid(alpha=0.3)
+    count_in_whole_numbers(axes)
     return figure
 
 

@@ -21,12 +21,12 @@ STUDY = "from mcmj.search.study import Study; Study('s', {}, {'x': 1}, 0, startu
 @pytest.mark.parametrize(
     ("package", "extra", "use"),
     [
-        ("xarray", "files", "import mcmj.zarr_file"),
-        ("zarr", "files", "import mcmj.zarr_file"),
-        ("h5py", "files", "import mcmj.openprc_file"),
-        ("dm_control", "control", "import mcmj.environment"),
-        ("dm_env", "control", "import mcmj.environment"),
-        ("gymnasium", "gym", "import mcmj.gymnasium_env"),
+        ("xarray", "files", "import mcmj.simulation.trajectory_files.zarr"),
+        ("zarr", "files", "import mcmj.simulation.trajectory_files.zarr"),
+        ("h5py", "files", "import mcmj.simulation.trajectory_files.openprc"),
+        ("dm_control", "control", "import mcmj.learning.environments.environment"),
+        ("dm_env", "control", "import mcmj.learning.environments.environment"),
+        ("gymnasium", "gym", "import mcmj.learning.environments.gymnasium_env"),
         ("optuna", "search", STUDY),
         ("pyarrow", "search", "import mcmj.search.export as e; e.write_parquet(None, 't.parquet')"),
         ("distributed", "cluster", "import mcmj.search.workers as w; w.Cluster('tcp://h:1')"),

@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from mcmj.pictures.colours import BLUE, ORANGE, TARGET_COLOUR
-from mcmj.pictures.plotting import TITLES, draw_phase_plane, new_figure
+from mcmj.pictures.plotting import TITLES, draw_orbit, draw_phase_plane, new_figure
 from mcmj.targets.limit_cycles import Target
 from mcmj.utils.validation import Array
 
@@ -66,8 +66,7 @@ def _draw_multipliers(axes: Axes, body: Complex, target: Complex | None) -> None
 
 
 def _draw_starts(figure: Figure, axes: Axes, target: Target, first: Array, times: Array) -> None:
-    orbit = target.orbit(1024)
-    axes.plot(*np.vstack([orbit, orbit[:1]])[:, :2].T, color=TARGET_COLOUR, lw=1.2)
+    draw_orbit(axes, target)
     good, known = np.isfinite(times), np.isfinite(first).all(axis=1)
     points = axes.scatter(
         first[good, 0], first[good, 1], c=times[good], s=16, cmap="viridis", zorder=3

@@ -5,7 +5,13 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from mcmj.pictures.colours import BLUE, GREEN, RED
-from mcmj.pictures.plotting import OUTPUT_STYLES, TITLES, draw_phase_plane, new_figure
+from mcmj.pictures.plotting import (
+    OUTPUT_STYLES,
+    TITLES,
+    count_in_whole_numbers,
+    draw_phase_plane,
+    new_figure,
+)
 from mcmj.targets.limit_cycles import Target
 from mcmj.utils.validation import Array
 
@@ -46,6 +52,7 @@ def _draw_learning(axes: Axes, rewards: Array, without: float) -> None:
     axes.set(xlabel="round", ylabel="mean reward of an episode", ylim=(0.0, 1.0))
     axes.set_title(f"cross-entropy method, {rewards.shape[1]} episodes a round")
     axes.legend(loc="lower right")
+    count_in_whole_numbers(axes)
 
 
 def _draw_run(axes: Axes, run: Run) -> None:

@@ -17,7 +17,7 @@ from mcmj.pictures.colours import (
     PINK,
     TARGET_COLOUR,
 )
-from mcmj.pictures.plotting import INTEGRATOR_MARKS, OUTPUT_STYLES, new_figure
+from mcmj.pictures.plotting import INTEGRATOR_MARKS, OUTPUT_STYLES, TARGET_STYLE, new_figure
 from mcmj.utils.validation import Array
 
 COLUMNS = 4
@@ -67,8 +67,7 @@ def emulation_figure(
 
 def _draw_orbit(axes: Axes, target: str, states: Array, wanted: Array) -> None:
     other = states.shape[1] // 2 if states.shape[1] != 3 else 2  # x1 over x1', or x over z
-    axes.plot(wanted[:, 0], wanted[:, other], color=TARGET_COLOUR, lw=3.5, alpha=0.55,
-              label="target")  # fmt: skip
+    axes.plot(wanted[:, 0], wanted[:, other], **TARGET_STYLE, label="target")  # fmt: skip
     axes.plot(states[:, 0], states[:, other], **OUTPUT_STYLES[0], lw=0.9, label="body")
     if states.shape[1] == 3:
         axes.set(xlabel="$x_1$ [m]", ylabel="$x_3$ [m]")

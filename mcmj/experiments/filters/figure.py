@@ -5,8 +5,7 @@ from collections.abc import Collection, Mapping
 import numpy as np
 from matplotlib.figure import Figure
 
-from mcmj.pictures.colours import TARGET_COLOUR
-from mcmj.pictures.plotting import OUTPUT_STYLES, new_figure
+from mcmj.pictures.plotting import OUTPUT_STYLES, TARGET_STYLE, new_figure
 from mcmj.utils.validation import Array
 
 SHOWN_SECONDS, SHOWN_SYMBOLS = 3.0, 80
@@ -38,18 +37,19 @@ def filter_figure(
         shown = round((SHOWN_SYMBOLS if counted else SHOWN_SECONDS) / spacing)
         places = spacing * np.arange(len(wanted))[:shown]
         drawn = "steps-mid" if counted else "default"
-        left.plot(places, wanted[:shown], color=TARGET_COLOUR, lw=3, alpha=0.55, drawstyle=drawn,
-                  label="target")  # fmt: skip
+        left.plot(places, wanted[:shown], **TARGET_STYLE, drawstyle=drawn, label="target")
         left.plot(places, outputs[:shown], lw=1.2, drawstyle=drawn, **OUTPUT_STYLES[0],
                   label="body")  # fmt: skip
         left.set(xlabel="symbol" if counted else "time [s]", xlim=(places[0], places[-1]))
+        left.set_ylabel("output")
         left.set_title(f"{TITLES.get(name, name)}, held-out data")
         kinds = {"body": "", "input and\ndelays": "baseline_", "input\nonly": "input_only_"}
         values = [errors[f"{kind}nrmse_std"] for kind in kinds.values()]
         bars = right.bar(list(kinds), values, color=["black", "0.6", "0.8"], width=0.6)
         right.bar_label(bars, fmt="%.2g", fontsize=8)
         right.set(ylim=(0, 1.2), ylabel="NRMSE (std)")
-    grid[0, 0].legend(frameon=True, framealpha=0.9, ncols=2, loc="upper right", fontsize=8)
+    figure.legend(*grid[0, 0].get_legend_handles_labels(), loc="outside upper center", ncols=2,
+                  frameon=False)  # fmt: skip
     return figure
 
 
@@ -68,11 +68,12 @@ def switch_figure(
     axes[0].set(ylabel="input", title="Pulses")
     names = {"feedback": "With feedback", "open": "Without feedback"}
     for panel, (name, title) in zip(axes[1:], names.items(), strict=True):
-        panel.plot(times, targets, color=TARGET_COLOUR, lw=3, alpha=0.55, label="target")
+        panel.plot(times, targets, **TARGET_STYLE, label="target")
         panel.plot(times, outputs[name], lw=1.0, **OUTPUT_STYLES[0], label="output")
         share = 100 * held[name]
         panel.set_title(f"{title}: right throughout {share:.0f} % of the pauses")
         panel.set(ylabel="output", ylim=(-2, 2))
-    axes[1].legend(frameon=True, framealpha=0.9, ncols=2, loc="upper right", fontsize=8)
+    figure.legend(*axes[1].get_legend_handles_labels(), loc="outside upper center", ncols=2,
+                  frameon=False)  # fmt: skip
     axes[-1].set(xlabel="time [s]", xlim=(times[0], times[-1]))
     return figure

@@ -10,7 +10,7 @@ from matplotlib.patches import Patch
 
 from mcmj.metrics.gaits import in_stance
 from mcmj.pictures.colours import BLACK, CHANGE_COLOUR, RECOVERED_COLOUR, TARGET_COLOUR, Colour
-from mcmj.pictures.plotting import best_phase, new_figure
+from mcmj.pictures.plotting import TARGET_STYLE, best_phase, new_figure
 from mcmj.targets.gaits import LEGS
 from mcmj.targets.limit_cycles import Target
 from mcmj.utils.validation import Array
@@ -39,9 +39,7 @@ def switch_figure(switches: Mapping[str, Switch], timestep: float) -> Figure:
         levels = SPACING * np.arange(len(LEGS))[::-1]
         for wanted_times, wanted in _targets(switch, timestep):
             seen = (wanted_times >= first) & (wanted_times <= last)
-            axes.plot(
-                wanted_times[seen], wanted[seen] + levels, color=TARGET_COLOUR, lw=3, alpha=0.55
-            )
+            axes.plot(wanted_times[seen], wanted[seen] + levels, **TARGET_STYLE)
         axes.plot(times[rows], outputs[rows] + levels, color="black", lw=1.1)
         axes.set_yticks(levels, LEGS)
         axes.set(xlim=(first, last), ylabel="output of leg")
@@ -50,7 +48,7 @@ def switch_figure(switches: Mapping[str, Switch], timestep: float) -> Figure:
     column[-1].set_xlabel("time after the switch of the readout [s]")
     figure.legend(
         handles=[
-            Line2D([], [], color=TARGET_COLOUR, lw=3, alpha=0.55, label="target"),
+            Line2D([], [], **TARGET_STYLE, label="target"),
             Line2D([], [], color="black", label="output"),
             *_mark_handles(),
         ],

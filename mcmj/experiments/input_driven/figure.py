@@ -7,13 +7,15 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from mcmj.pictures.colours import BLUE, ORANGE, TARGET_COLOUR
+from mcmj.pictures.colours import BLUE, ORANGE
 from mcmj.pictures.plotting import (
     OUTPUT_STYLES,
+    TARGET_STYLE,
     best_phase,
     draw_outputs,
     draw_phase_plane,
     new_figure,
+    output_handles,
 )
 from mcmj.targets.limit_cycles import Target
 from mcmj.utils.validation import Array
@@ -36,7 +38,7 @@ def input_curves_figure(
     labels = ("amplitude of $x_1$", "frequency of $x_1$ [Hz]")
     for quantity, (axes, label) in enumerate(zip(figure.subplots(1, 2), labels, strict=True), 1):
         axes.axvspan(*taught, color="0.93", lw=0, zorder=0)
-        axes.semilogx(target[0], target[quantity], color=TARGET_COLOUR, lw=4, alpha=0.55)
+        axes.semilogx(target[0], target[quantity], **TARGET_STYLE)
         for branch, colour, mark in zip(sweep, (BLUE, ORANGE), "v^", strict=False):
             axes.semilogx(branch[0], branch[quantity], mark, color=colour, ms=3.5, alpha=0.7, mew=0)
         axes.semilogx(held[0], held[quantity], "o", color="black", ms=6, mfc="white", mew=1.3)
@@ -46,7 +48,7 @@ def input_curves_figure(
         axes.set(xlabel="input $\\epsilon$", ylabel=label, ylim=_limits(target[quantity]))
         axes.grid(alpha=0.3)
     handles = [
-        Line2D([], [], color=TARGET_COLOUR, lw=4, alpha=0.55, label="target"),
+        Line2D([], [], **TARGET_STYLE, label="target"),
         Line2D([], [], color="black", ls="", marker="o", ms=6, mfc="white", mew=1.3,
                label="body, constant input"),
     ]  # fmt: skip
@@ -83,11 +85,7 @@ def jumps_figure(
             ax.set(ylabel=name, xlabel="")
     for ax in axes[-1, :2]:
         ax.set_xlabel("time since the jump [s]")
-    handles = [
-        Line2D([], [], color=TARGET_COLOUR, lw=3, alpha=0.55, label="target"),
-        *(Line2D([], [], **OUTPUT_STYLES[c], label=f"output $x_{c + 1}$") for c in range(2)),
-    ]
-    figure.legend(handles=handles, loc="outside upper center", ncols=3, frameon=False)
+    figure.legend(handles=output_handles(2), loc="outside upper center", ncols=3, frameon=False)
     return figure
 
 

@@ -7,9 +7,15 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from mcmj.metrics.orbits import ORBIT_POINTS
 from mcmj.pictures.colours import BLACK, CHANGE_COLOUR, RECOVERED_COLOUR, TARGET_COLOUR
-from mcmj.pictures.plotting import OUTPUT_STYLES, TITLES, new_figure
+from mcmj.pictures.plotting import (
+    OUTPUT_STYLES,
+    TARGET_STYLE,
+    TITLES,
+    draw_orbit,
+    new_figure,
+    output_handles,
+)
 from mcmj.targets.limit_cycles import Target
 from mcmj.utils.validation import Array
 
@@ -43,15 +49,15 @@ def perturb_figure(target: Target, runs: Mapping[str, Run], *, shown: float = 15
         time_axes.set_title(f"{NAMES.get(name, name)}: {back}")
         plane.set_title(f"orbit error in the end {100 * error:.2f} %")
     axes[-1, 0].set_xlabel("time in closed loop [s]")
-    axes[-1, 1].set_xlabel("$x_1$")
     phases = zip(PHASE_COLOURS, PHASE_NAMES, strict=True)
     handles = [
-        Line2D([], [], color=TARGET_COLOUR, lw=3, alpha=0.55, label="target orbit"),
+        Line2D([], [], **TARGET_STYLE, label="target"),
         *(Line2D([], [], color=colour, label=name) for colour, name in phases),
         *(Line2D([], [], color="black", ls=OUTPUT_STYLES[c]["ls"], label=f"$x_{c + 1}$")
           for c in range(2)),
+        Line2D([], [], color=RECOVERED_COLOUR, lw=1, ls=":", label="back from here on"),
     ]  # fmt: skip
-    figure.legend(handles=handles, loc="outside upper center", ncols=6, frameon=False)
+    figure.legend(handles=handles, loc="outside upper center", ncols=7, frameon=False)
     return figure
 
 
@@ -60,8 +66,9 @@ def _draw_run(
 ) -> None:
     times, fed, clean, boundaries, _, recovery = run
     outputs = clean if noisy else fed
-    orbit = target.orbit(ORBIT_POINTS)
-    plane.plot(*orbit[np.r_[:ORBIT_POINTS, 0]].T, color=TARGET_COLOUR, lw=3.5, alpha=0.55)
+    draw_orbit(plane, target)
+    time_axes.set(ylabel="outputs")
+    time_axes.margins(y=0.08)
     if len(times):
         _, begin, end = (float(times[row]) for row in boundaries[:3])
         time_axes.axvspan(begin, end, color=CHANGE_COLOUR, alpha=0.15, lw=0)
@@ -79,10 +86,6 @@ def _draw_run(
             time_axes.axvline(end + recovery, color=RECOVERED_COLOUR, lw=1, ls=":")
         last_shown = end + max(shown, 1.3 * recovery if np.isfinite(recovery) else 0.0)
         time_axes.set_xlim(times[0], min(times[-1], last_shown))
-    reach = 2.0 * np.abs(orbit).max(axis=0)  # noise may be larger than the picture
-    time_axes.set(ylim=(-reach.max(), reach.max()), ylabel="outputs")
-    plane.set(aspect="equal", ylabel="$x_2$")
-    plane.set(xlim=(-reach[0], reach[0]), ylim=(-reach[1], reach[1]))
 
 
 def tolerance_figure(amplitudes: Sequence[float], errors: Array, tolerance: float) -> Figure:
@@ -95,9 +98,10 @@ def tolerance_figure(amplitudes: Sequence[float], errors: Array, tolerance: floa
     axes.axhline(tolerance, color=TARGET_COLOUR, ls="--", lw=1, label="recovered below")
     good = (errors < tolerance).sum(axis=0)
     for amplitude, count in zip(amplitudes, good, strict=True):
-        axes.annotate(f"{count}/{len(errors)}", (amplitude, 1.0), (0, 3), ha="center", fontsize=8,
+        axes.annotate(str(count), (amplitude, 1.0), (0, 3), ha="center", fontsize=8,
                       xycoords=("data", "axes fraction"), textcoords="offset points")  # fmt: skip
-    axes.set(xlabel="noise on every length, standard deviation [m]", ylabel="orbit error after")
+    axes.set(xlabel="noise on every length, standard deviation [m]", ylabel="orbit error after it")
+    axes.set_title(f"bodies that recover, of {len(errors)}", pad=16)
     axes.legend(frameon=False)
     axes.grid(alpha=0.3)
     return figure
@@ -114,14 +118,12 @@ def swing_up_figure(runs: Mapping[str, tuple[Target, float, Array, float, float]
     for (name, run), (time_axes, plane) in zip(runs.items(), axes, strict=True):
         target, timestep, outputs, error, swing_up = run
         times = timestep * np.arange(len(outputs))
-        orbit = target.orbit(ORBIT_POINTS)
-        plane.plot(*orbit[np.r_[:ORBIT_POINTS, 0]].T, color=TARGET_COLOUR, lw=3.5, alpha=0.55)
+        draw_orbit(plane, target)
         arrived = np.isfinite(swing_up)
         end = max(20.0, 1.5 * swing_up) if arrived else np.inf
         rows = times <= end
         for c in range(2):
-            time_axes.plot(times[rows], outputs[rows, c], lw=1.2, **OUTPUT_STYLES[c],
-                           label=f"$x_{c + 1}$")  # fmt: skip
+            time_axes.plot(times[rows], outputs[rows, c], lw=1.2, **OUTPUT_STYLES[c])
         plane.plot(*outputs[rows].T, color="black", lw=0.8)
         if len(times):
             plane.plot(*outputs[0], "o", color=CHANGE_COLOUR, ms=6)
@@ -131,10 +133,13 @@ def swing_up_figure(runs: Mapping[str, tuple[Target, float, Array, float, float]
         time_axes.set_title(f"{TITLES.get(name, name)}, from total rest: {when}")
         time_axes.set(ylabel="outputs")
         time_axes.margins(x=0)
+        time_axes.locator_params(axis="x", nbins=8)
         plane.set_title(f"orbit error in the end {100 * error:.2f} %")
-        plane.set(aspect="equal", ylabel="$x_2$")
-        plane.locator_params(axis="x", nbins=2)
-    axes[0, 0].legend(loc="upper left", frameon=False)
     axes[-1, 0].set_xlabel("time in closed loop [s]")
-    axes[-1, 1].set_xlabel("$x_1$")
+    handles = [
+        *output_handles(2),
+        Line2D([], [], color=CHANGE_COLOUR, marker="o", ls="", label="at rest"),
+        Line2D([], [], color=CHANGE_COLOUR, lw=1.2, ls=":", label="on the orbit from here on"),
+    ]
+    figure.legend(handles=handles, loc="outside upper center", ncols=5, frameon=False)
     return figure

@@ -14,7 +14,7 @@ from matplotlib.ticker import LogLocator, NullFormatter
 
 from mcmj.core.body import Body
 from mcmj.pictures.colours import GROUP_COLOURS, TARGET_COLOUR
-from mcmj.pictures.plotting import TITLES, draw_body, new_figure
+from mcmj.pictures.plotting import TITLES, count_in_whole_numbers, draw_body, new_figure
 from mcmj.utils.validation import Array
 
 _ORDERS = {
@@ -69,6 +69,8 @@ def _draw_rates(axes: Axes, table: Sequence[Mapping[str, Any]]) -> None:
     if "low" not in table[0] and len(places) <= 8:
         axes.set_xticks(places, [f"{place:.3g}" for place in places])
         axes.minorticks_off()
+    elif axes.get_xscale() == "linear" and all(isinstance(v, int) for v in values):
+        count_in_whole_numbers(axes)
 
 
 def score_figure(
@@ -208,6 +210,7 @@ def guided_figure(
     so_far = (np.maximum if maximise[0] else np.minimum).accumulate(values)
     left.plot(number, values, ".", color="0.5", label="a setting")
     left.step(number, so_far, where="post", color="black", lw=1.4, label="best so far")
+    count_in_whole_numbers(left)
     left.set(xlabel="settings tried", ylabel=f"objective ({names[0]})")
     left.grid(alpha=0.3)
     left.legend(frameon=False)

@@ -7,8 +7,8 @@ from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 
 from mcmj.experiments.walk.figure import draw_stance
-from mcmj.pictures.colours import MUSCLE_COLOUR, TARGET_COLOUR
-from mcmj.pictures.plotting import OUTPUT_STYLES, best_phase, new_figure
+from mcmj.pictures.colours import MUSCLE_COLOUR
+from mcmj.pictures.plotting import OUTPUT_STYLES, TARGET_STYLE, best_phase, new_figure
 from mcmj.robots.trunk import Trunk
 from mcmj.robots.walk_metrics import Walk
 from mcmj.targets.gaits import LEGS
@@ -70,7 +70,7 @@ def _commands(axes: Axes, name: str, target: Target, walk: Walk) -> None:
     phase = best_phase(outputs, target, times)
     wanted = target.sample(times + phase)
     for muscle, style in enumerate(OUTPUT_STYLES):
-        axes.plot(times, 1e3 * wanted[:, muscle], color=TARGET_COLOUR, lw=3, alpha=0.5,
+        axes.plot(times, 1e3 * wanted[:, muscle], **TARGET_STYLE,
                   label="target" if muscle == 0 else None)  # fmt: skip
         label = f"LF, {('fore', 'rear')[muscle]} muscle"
         axes.plot(times, 1e3 * outputs[:, muscle], **style, lw=1.2, label=label)
