@@ -47,6 +47,7 @@ MUJOCO = {
     "experiments.limit_cycle.loop_cost",  # times bare mj_step
     "mjcf.check",
     "mjcf.read",
+    "pictures.opengl",
     "pictures.opengl_view",
     "pictures.trunk_video",
     "pictures.viewer",

@@ -5,7 +5,7 @@ import xml.etree.ElementTree as ET
 import numpy as np
 
 from mcmj.core.body import Body
-from mcmj.pictures.colours import (
+from mcmj.utils.colours import (
     FEEDBACK_COLOURS,
     FIXED_COLOUR,
     INPUT_COLOUR,

@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from mcmj.core.body import Body, spring_lengths
 from mcmj.mjcf.appearance import frame
-from mcmj.pictures.colours import strain_colours
+from mcmj.utils.colours import strain_colours
 from mcmj.utils.errors import InvalidArgumentError
 from mcmj.utils.validation import Array, as_array, require_number
 

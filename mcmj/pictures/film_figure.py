@@ -13,7 +13,8 @@ from matplotlib.lines import Line2D
 from PIL import Image
 
 from mcmj.mjcf.appearance import node_kinds
-from mcmj.pictures.colours import (
+from mcmj.pictures.film import Film
+from mcmj.utils.colours import (
     BLACK,
     CHANGE_COLOUR,
     OUTPUT_COLOURS,
@@ -21,7 +22,6 @@ from mcmj.pictures.colours import (
     STRETCHED_COLOUR,
     TARGET_COLOUR,
 )
-from mcmj.pictures.film import Film
 
 Picture = npt.NDArray[np.uint8]
 

@@ -8,8 +8,8 @@ from matplotlib.figure import Figure
 
 from mcmj.core.body import Body
 from mcmj.mjcf.appearance import NODE_SHARE, SPRING_SHARE, frame, node_colour
-from mcmj.pictures.colours import ARROW_COLOUR
 from mcmj.pictures.plotting import new_figure
+from mcmj.utils.colours import ARROW_COLOUR
 from mcmj.utils.validation import Array
 
 Picture = npt.NDArray[np.uint8]

@@ -10,8 +10,8 @@ from mcmj.core.body import Body
 from mcmj.mjcf.appearance import frame
 from mcmj.mjcf.read import load_model
 from mcmj.mjcf.write import to_mjcf
-from mcmj.pictures.colours import ARROW_COLOUR
 from mcmj.pictures.opengl import new_renderer
+from mcmj.utils.colours import ARROW_COLOUR
 from mcmj.utils.validation import Array
 
 Picture = npt.NDArray[np.uint8]

@@ -16,7 +16,8 @@ from matplotlib.ticker import MaxNLocator
 from mcmj.core.body import Body
 from mcmj.metrics.orbits import ORBIT_POINTS
 from mcmj.mjcf.appearance import node_colour
-from mcmj.pictures.colours import (
+from mcmj.targets.limit_cycles import Target
+from mcmj.utils.colours import (
     BLACK,
     BLUE,
     FEEDBACK_COLOURS,
@@ -26,7 +27,6 @@ from mcmj.pictures.colours import (
     PLAIN_COLOUR,
     TARGET_COLOUR,
 )
-from mcmj.targets.limit_cycles import Target
 from mcmj.utils.files import whole_file
 from mcmj.utils.validation import Array
 

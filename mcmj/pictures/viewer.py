@@ -21,9 +21,9 @@ from mcmj.core.body import Body
 from mcmj.mjcf.appearance import CAMERA_ANGLE, frame, node_style
 from mcmj.mjcf.read import load_model
 from mcmj.mjcf.write import to_mjcf
-from mcmj.pictures.colours import OUTPUT_COLOURS, strain_colours
 from mcmj.pictures.film import strains
 from mcmj.simulation.interactive import LiveLoop
+from mcmj.utils.colours import OUTPUT_COLOURS, strain_colours
 from mcmj.utils.errors import McmjError
 from mcmj.utils.validation import Array
 

@@ -13,13 +13,6 @@ from PIL import Image
 import mcmj
 from mcmj.experiments.render import run as render
 from mcmj.mjcf.appearance import frame, node_colour
-from mcmj.pictures.colours import (
-    CHANGE_COLOUR,
-    FIXED_COLOUR,
-    SHORTENED_COLOUR,
-    STRETCHED_COLOUR,
-    strain_colours,
-)
 from mcmj.pictures.film import Film, Window, deformation_scale, strains
 from mcmj.pictures.film_figure import FilmFigure
 from mcmj.pictures.flat_view import FlatView
@@ -37,6 +30,13 @@ from mcmj.pictures.rendering import (
     write_film,
 )
 from mcmj.simulation.trajectory_files.npz import save_trajectory
+from mcmj.utils.colours import (
+    CHANGE_COLOUR,
+    FIXED_COLOUR,
+    SHORTENED_COLOUR,
+    STRETCHED_COLOUR,
+    strain_colours,
+)
 from mcmj.utils.errors import InvalidArgumentError, TrajectoryFileError, UnknownNameError
 
 SCRIPT = Path(__file__).parents[2] / "scripts" / "render.py"

@@ -7,8 +7,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from mcmj.pictures.colours import GROUP_COLOURS
 from mcmj.pictures.plotting import new_figure
+from mcmj.utils.colours import GROUP_COLOURS
 from mcmj.utils.validation import Array
 
 NAMES = {

@@ -7,9 +7,9 @@ import numpy.typing as npt
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from mcmj.pictures.colours import BLUE, ORANGE, TARGET_COLOUR
 from mcmj.pictures.plotting import TITLES, draw_orbit, draw_phase_plane, new_figure
 from mcmj.targets.limit_cycles import Target
+from mcmj.utils.colours import BLUE, ORANGE, TARGET_COLOUR
 from mcmj.utils.validation import Array
 
 Complex = npt.NDArray[np.complex128]

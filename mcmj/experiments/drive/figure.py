@@ -4,7 +4,6 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from mcmj.pictures.colours import BLUE, GREEN, RED
 from mcmj.pictures.plotting import (
     OUTPUT_STYLES,
     TITLES,
@@ -13,6 +12,7 @@ from mcmj.pictures.plotting import (
     new_figure,
 )
 from mcmj.targets.limit_cycles import Target
+from mcmj.utils.colours import BLUE, GREEN, RED
 from mcmj.utils.validation import Array
 
 Run = tuple[Array, Array, Array, float]

@@ -9,7 +9,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from mcmj.core.integrators import INTEGRATORS
-from mcmj.pictures.colours import (
+from mcmj.pictures.plotting import INTEGRATOR_MARKS, OUTPUT_STYLES, TARGET_STYLE, new_figure
+from mcmj.utils.colours import (
     BROWN,
     GROUP_COLOURS,
     INTEGRATOR_COLOURS,
@@ -17,7 +18,6 @@ from mcmj.pictures.colours import (
     PINK,
     TARGET_COLOUR,
 )
-from mcmj.pictures.plotting import INTEGRATOR_MARKS, OUTPUT_STYLES, TARGET_STYLE, new_figure
 from mcmj.utils.validation import Array
 
 COLUMNS = 4

@@ -9,10 +9,10 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from mcmj.metrics.gaits import in_stance
-from mcmj.pictures.colours import BLACK, CHANGE_COLOUR, RECOVERED_COLOUR, TARGET_COLOUR, Colour
 from mcmj.pictures.plotting import TARGET_STYLE, best_phase, new_figure
 from mcmj.targets.gaits import LEGS
 from mcmj.targets.limit_cycles import Target
+from mcmj.utils.colours import BLACK, CHANGE_COLOUR, RECOVERED_COLOUR, TARGET_COLOUR, Colour
 from mcmj.utils.validation import Array
 
 SPACING = 2.6  # between the legs' outputs, which are within +-1.1

@@ -5,8 +5,8 @@ from collections.abc import Mapping
 import numpy as np
 from matplotlib.figure import Figure
 
-from mcmj.pictures.colours import BLACK, BLUE, GREEN, TARGET_COLOUR
 from mcmj.pictures.plotting import new_figure
+from mcmj.utils.colours import BLACK, BLUE, GREEN, TARGET_COLOUR
 
 PLAIN_STEP = 1e-3  # s: what a simulation takes unless told otherwise
 TOP = 2.0  # s: unbounded steps are drawn here

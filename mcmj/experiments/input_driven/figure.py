@@ -7,7 +7,6 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from mcmj.pictures.colours import BLUE, ORANGE
 from mcmj.pictures.plotting import (
     OUTPUT_STYLES,
     TARGET_STYLE,
@@ -18,6 +17,7 @@ from mcmj.pictures.plotting import (
     output_handles,
 )
 from mcmj.targets.limit_cycles import Target
+from mcmj.utils.colours import BLUE, ORANGE
 from mcmj.utils.validation import Array
 
 Curve = tuple[Array, Array, Array]  # inputs, amplitudes, frequencies [Hz]

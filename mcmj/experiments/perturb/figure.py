@@ -7,7 +7,6 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from mcmj.pictures.colours import BLACK, CHANGE_COLOUR, RECOVERED_COLOUR, TARGET_COLOUR
 from mcmj.pictures.plotting import (
     OUTPUT_STYLES,
     TARGET_STYLE,
@@ -17,6 +16,7 @@ from mcmj.pictures.plotting import (
     output_handles,
 )
 from mcmj.targets.limit_cycles import Target
+from mcmj.utils.colours import BLACK, CHANGE_COLOUR, RECOVERED_COLOUR, TARGET_COLOUR
 from mcmj.utils.validation import Array
 
 PHASE_COLOURS = (BLACK, CHANGE_COLOUR, RECOVERED_COLOUR)  # undisturbed, disturbed, free again

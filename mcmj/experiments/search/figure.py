@@ -13,8 +13,8 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullFormatter
 
 from mcmj.core.body import Body
-from mcmj.pictures.colours import GROUP_COLOURS, TARGET_COLOUR
 from mcmj.pictures.plotting import TITLES, count_in_whole_numbers, draw_body, new_figure
+from mcmj.utils.colours import GROUP_COLOURS, TARGET_COLOUR
 from mcmj.utils.validation import Array
 
 _ORDERS = {

@@ -7,8 +7,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from mcmj.core.integrators import INTEGRATORS
-from mcmj.pictures.colours import GREY, INTEGRATOR_COLOURS, Colour
 from mcmj.pictures.plotting import INTEGRATOR_MARKS, new_figure
+from mcmj.utils.colours import GREY, INTEGRATOR_COLOURS, Colour
 
 STYLES = {  # integrator, whose colour it is, and marks; dashed: the twins
     "mujoco_Euler_hook": ("Euler_hook", "o:"),

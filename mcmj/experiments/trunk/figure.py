@@ -7,12 +7,12 @@ from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 
 from mcmj.experiments.walk.figure import draw_stance
-from mcmj.pictures.colours import MUSCLE_COLOUR
 from mcmj.pictures.plotting import OUTPUT_STYLES, TARGET_STYLE, best_phase, new_figure
 from mcmj.robots.trunk import Trunk
 from mcmj.robots.walk_metrics import Walk
 from mcmj.targets.gaits import LEGS
 from mcmj.targets.limit_cycles import Target
+from mcmj.utils.colours import MUSCLE_COLOUR
 
 PERIODS = 3.0  # of each gait that are shown
 

@@ -7,10 +7,10 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from mcmj.pictures.colours import BLUE, GREEN, ORANGE, RED
 from mcmj.pictures.plotting import new_figure
 from mcmj.robots.walk_metrics import Walk
 from mcmj.targets.gaits import LEGS
+from mcmj.utils.colours import BLUE, GREEN, ORANGE, RED
 from mcmj.utils.validation import Array
 
 COLOURS = (BLUE, GREEN, RED, ORANGE)
