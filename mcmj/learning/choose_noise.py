@@ -57,7 +57,7 @@ def select_teaching(
     """Choose ridge and teacher noise by the orbit error of free runs from held-out starts.
 
     Every noise is taught once; its regression serves all ridges. All candidates run from the
-    same starts (mcmj.heldout), forced with the noise of `teaching`. Of equal errors the first.
+    same starts (learning.held_out), forced with the noise of `teaching`. Of equal errors the first.
 
     Args:
         simulation: the body; afterwards it has the chosen readout and stands at a start.

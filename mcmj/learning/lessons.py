@@ -1,4 +1,4 @@
-"""What is to be taught, and how: lessons of teacher forcing; mcmj.teaching gives them."""
+"""What is to be taught, and how: lessons of teacher forcing; mcmj.learning.teaching gives them."""
 
 from collections.abc import Callable
 from dataclasses import dataclass

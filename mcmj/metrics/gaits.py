@@ -16,7 +16,7 @@ STILL = 1e-6  # a leg's fundamental below this share of the largest has no phase
 def in_stance(outputs: Array) -> npt.NDArray[np.bool_]:
     """Whether each leg is in stance (T, n): where its output (T, n) falls, by central differences.
 
-    The oscillators of mcmj.gaits are in stance where y_i > 0, which outputs do not show; but
+    The oscillators of targets.gaits are in stance where y_i > 0, which outputs do not show; but
     there x_i' is near -omega_i y_i, so x_i falls.
     """
     values = as_array("outputs", outputs, (None, None))

@@ -1,6 +1,6 @@
 """Reads a .mat file in a process of its own: SciPy's reader can crash on a damaged one.
 
-Run by mcmj.matfile as a script; it knows nothing of mcmj, so that it starts at once. Writes the
+Run by mjcf.toolbox_net as a script; it knows nothing of mcmj, so that it starts at once. Writes the
 structures' numbers and texts as plain arrays, named by their path in the file, to an NPZ file.
 """
 

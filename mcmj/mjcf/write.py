@@ -44,7 +44,7 @@ def to_mjcf(
     Args:
         body: the body.
         timestep: physics step [s].
-        integrator: a name of mcmj.integrators; without mcmj's callbacks it is the row's
+        integrator: a name of mcmj.core.integrators; without mcmj's callbacks it is the row's
             `mujoco_name`.
         w_out: readout (L, n_outputs), or (L + 1, n_outputs) with a bias in the last row. With
             one the loop is closed wherever mcmj's callbacks are installed; else it is open.

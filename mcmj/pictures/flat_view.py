@@ -1,4 +1,4 @@
-"""The same pictures as mcmj.glview by matplotlib alone: slower, but no driver can be missing."""
+"""The same pictures as opengl_view by matplotlib alone: slower, but no driver can be missing."""
 
 import numpy as np
 import numpy.typing as npt

@@ -14,7 +14,7 @@ REMEDY = "on Debian or Ubuntu: apt-get install libegl1 libegl-mesa0 libgl1-mesa-
 
 
 class RenderingUnavailableError(McmjError):
-    """No OpenGL here; pictures of bodies by matplotlib (mcmj.flatview) do without."""
+    """No OpenGL here; pictures of bodies by matplotlib (mcmj.pictures.flat_view) do without."""
 
 
 def new_renderer(model: mujoco.MjModel, width: int, height: int) -> mujoco.Renderer:

@@ -3,7 +3,7 @@
 Under a teacher a body sees only the states near what it is taught. Where its outputs act at
 once, as muscles do, its springs mostly show the last command, and a regression learns to echo
 it instead of leading it. So a teacher only begins: then the body's own outputs drive it, and
-recursive least squares (mcmj.rls) corrects the readout so often that they stay near the target.
+recursive least squares corrects the readout so often that they stay near the target.
 The states that its own errors lead to are learned from too (Sussillo and Abbott, Neuron 63,
 2009). What remains is a linear, static readout, as a regression's.
 """
@@ -99,7 +99,7 @@ def force_learn(
     A robot that falls in a trial stands up and is led by the teacher again.
 
     Args:
-        target: of the muscles, see mcmj.trunk.muscle_target.
+        target: of the muscles, see mcmj.robots.trunk.muscle_target.
         seed: of the noise.
         on_steps: called with the number of steps done, for progress bars.
 

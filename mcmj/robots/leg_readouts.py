@@ -1,6 +1,6 @@
 """What drives a robot's legs in one gait: linear readouts of the body's springs.
 
-The readout of a gait (mcmj.gaits) says where each leg is, and closes the loop. A second one,
+The readout of a gait (targets.gaits) says where each leg is, and closes the loop. A second one,
 of the same springs, says how far each leg is lifted; nothing feeds it back:
 
     z_i = max(0, x_i') / max_t x_i'      x_i rises in swing, when the foot goes forwards

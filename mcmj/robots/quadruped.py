@@ -8,7 +8,7 @@ are linear in what the body's springs measure, so they are two of MuJoCo's actua
     leg:  k B_i z_i         - k b_i - d b_i'       z_i  how far the leg is drawn in, 0 to 1
 
 The first term is a user actuator with the readout as its weights, run by the compiled
-callback of mcmj.laws, the others an affine one. There is no gait in this model; A, B and c
+callback of callbacks.install, the others an affine one. There is no gait in this model; A, B and c
 (Stride) are the scale and offset of a gait's readouts.
 """
 
@@ -111,7 +111,7 @@ def quadruped_mjcf(robot: Quadruped) -> str:
 
     Names: body trunk; per leg bodies LF, LF_lower, joints LF_hip, LF_leg, user actuators
     LF_swing, LF_lift, affine ones LF_hip_servo, LF_leg_servo; sensors LF_length, LF_rate of the
-    leg's joint, then LF_contact. Only feet touch, and only the ground (see mcmj.walkscene).
+    leg's joint, then LF_contact. Only feet touch, and only the ground (see mcmj.robots.walk_scene).
     """
     legs = "".join(_leg(robot, name) for name in LEGS)
     actuators = "".join(_actuators(robot, name) for name in LEGS)

@@ -1,6 +1,6 @@
 """A robot that is its own computer: a random network of springs on four legs of muscle, in a plane.
 
-The trunk is a random body (mcmj.generator), upright in the x-y plane, under gravity along -y.
+The trunk is a random body (core.random_body), upright in the x-y plane, under gravity along -y.
 Nothing is fixed, and there is no joint that could bear a torque: a leg is a foot, one more
 point mass, hung from two nodes of the trunk by a muscle each, a spring whose rest length
 changes by c_j(t):
@@ -110,7 +110,7 @@ class Trunk:
 
 
 def draw_trunk(seed: int, settings: TrunkSettings | None = None) -> Trunk:
-    """Draw a robot; every quantity has its own random stream, as in mcmj.generator.
+    """Draw a robot; every quantity has its own random stream, as in mcmj.core.random_body.
 
     Args:
         seed: integer >= 0; the same seed and settings give the same bits.
@@ -163,7 +163,7 @@ def muscle_lengths(trunk: Trunk, swing: npt.ArrayLike, lift: npt.ArrayLike) -> A
 
 
 def muscle_target(trunk: Trunk, gait: str, pace: float) -> Target:
-    """The eight muscles' changes of length in a gait of mcmj.gaits, so many times faster.
+    """The eight muscles' changes of length in a gait of mcmj.targets.gaits, so many times faster.
 
     Raises:
         UnknownNameError: no such gait.

@@ -1,4 +1,4 @@
-"""The robot of mcmj.trunk in MuJoCo: a readout of its springs' lengths drives its muscles.
+"""The robot of mcmj.robots.trunk in MuJoCo: a readout of its springs' lengths drives its muscles.
 
     c_j = sum_i w_ij (l_i - l_i*) + w_0j      l*: the lengths at rest, as the robot was drawn
 

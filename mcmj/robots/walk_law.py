@@ -9,7 +9,7 @@ the force [N] or torque [N m] of the actuators of leg i is
     leg       k B_i z_i
     input     u_i = g F_i / (M gravity)      F_i = k (b_i - B_i z_i) + d b_i'
 
-beside the servos' own springs and dampers (mcmj.quadruped). F_i is the force that the servo of
+beside the servos' own springs and dampers (robots.quadruped). F_i is the force that the servo of
 leg i bears, M the robot's mass without load. Input i pushes the nodes that feedback channel i
 pushes, as strongly. With g = 0 the body does not know of the robot.
 """

@@ -1,6 +1,6 @@
 """The scene of a walk as one MuJoCo model: a planar body, a robot beside it, the ground.
 
-The body is the model that mcmj.mjcf writes, and the robot (mcmj.quadruped) is attached to it by
+The body is the model that mjcf writes, and the robot (robots.quadruped) is attached to it by
 MjSpec. Gravity cannot move the body's nodes, which slide horizontally.
 """
 

@@ -1,7 +1,7 @@
 """What drives a robot's legs is a body: both in one MuJoCo model, stepped wholly in C.
 
-The body walks at another pace and size than it was taught at (mcmj.units). The law that joins
-it to the robot (mcmj.walklaw) is all in actuators' user data; a teacher enters through ctrl.
+The body walks at another pace and size than it was taught at (robots.rescale). The law that joins
+it to the robot (robots.walk_law) is all in actuators' user data; a teacher enters through ctrl.
 """
 
 from dataclasses import replace

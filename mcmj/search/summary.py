@@ -24,7 +24,7 @@ def success_by_setting(
     Returns:
         By path, one row a value (or bin of a random range, with as many settings as the
         others): value, a number, text or list; low and high of a bin; the counts and interval
-        of mcmj.rates.success_rate.
+        of mcmj.utils.success_rates.success_rate.
     """
     table: dict[str, list[dict[str, object]]] = {}
     for path, part in space.items():

@@ -1,9 +1,9 @@
-"""What an experiment's phases say; mcmj.schedule runs them.
+"""What an experiment's phases say; mcmj.simulation.run_phases runs them.
 
     Schedule([Phase(10), Phase(10, freeze=(0,)), Phase(30)])
 
 is 10 s undisturbed, 10 s with output 0 held at its last value, 30 s free. In every phase
-channel c pushes with g_c (w_c . lengths) + o_c(t), the law of mcmj.drive; a phase says what g
+channel c pushes with g_c (w_c . lengths) + o_c(t), the law of a rollout; a phase says what g
 and o are (section 6.1.1 of Hauser et al. 2012 for the perturbations).
 """
 

@@ -1,4 +1,4 @@
-"""Phases (mcmj.phases) run one after the other in the compiled loop, reproducible from a seed."""
+"""Phases run one after the other in the compiled loop, reproducible from a seed."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass

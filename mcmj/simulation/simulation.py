@@ -44,7 +44,7 @@ class Simulation:
             of weights and bias, or a Readout.
         timestep: control step [s]: inputs, feedback and records go at this pace.
         integrator: one of MuJoCo's: Euler, RK4, implicit, implicitfast, discrete; or leapfrog,
-            of second order at Euler's cost (mcmj.leapfrog).
+            of second order at Euler's cost (mcmj.core.callbacks.leapfrog).
         springs: "native" (MuJoCo's polynomial), "cubic" or "tansig" (compiled callback), or
             your own SpringLaw.
         feedback_delay: number of control steps between a length and the force it feeds back;

@@ -127,7 +127,7 @@ def test_states_and_outputs_go_through_the_nodes(body, w_bias):
     loop = ClosedLoop(body, w_bias)
     states = np.random.default_rng(0).standard_normal((3, loop.size))
     positions, velocities = loop.nodes(states)
-    again = loop.vector(mcmj.trajectory.State(positions[1], velocities[1]))
+    again = loop.vector(mcmj.core.trajectory.State(positions[1], velocities[1]))
     np.testing.assert_array_equal(again, states[1])
     assert (positions[:, body.fixed] == body.positions[body.fixed]).all()
     run = loop.run(states, 1)

@@ -141,7 +141,7 @@ def test_the_committed_body_has_its_four_readouts():
     body, readouts, source = get_body(Config(), 0)
     assert set(readouts) == set(GAITS)
     assert (body.n_nodes, body.n_outputs) == (50, 4)
-    drawn = mcmj.generator.draw_body(
+    drawn = mcmj.core.random_body.draw_body(
         source["body"]["seed"], BodySettings(**source["body"]["settings"])
     )
     assert drawn == body

@@ -108,7 +108,7 @@ def test_fine_steps_agree_with_dop853(name):
     case = CASES[name](0)
     x1, x2 = exact_amplitudes(case, 0.01)
     safe = stability_limit(case.body, "RK4", elongation=x1, speed=x2, w_out=case.w_out)
-    turn = np.ptp(case.velocities) / mcmj.body.spring_lengths(
+    turn = np.ptp(case.velocities) / mcmj.core.body.spring_lengths(
         case.body.positions, case.body.springs
     ).min()  # fmt: skip
     step = min(1e-3, safe / 16, 1 / (8 * turn + 1e-9))

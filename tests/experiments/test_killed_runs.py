@@ -73,7 +73,7 @@ def test_where_there_are_no_locks_runs_go_on(tmp_path, monkeypatch, missing):
 
 
 def test_a_killed_run_leaves_no_lock(tmp_path):
-    code = "import sys; from mcmj.store import only_run\n"
+    code = "import sys; from mcmj.utils.files import only_run\n"
     code += "with only_run(sys.argv[1]):\n    print(1, flush=True)\n    sys.stdin.read()"
     command = [sys.executable, "-c", code, str(tmp_path)]
     with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as process:

@@ -107,7 +107,7 @@ def test_symmetric_pair_stays_symmetric():
 
 def kicked(body, rng, speed=0.5):
     speeds = rng.uniform(-speed, speed, (body.n_nodes, 2)) * ~body.fixed[:, None]
-    return mcmj.trajectory.State(body.positions, speeds)
+    return mcmj.core.trajectory.State(body.positions, speeds)
 
 
 def potential(body, lengths):
@@ -179,7 +179,7 @@ def test_rotation_and_reflection(reflect):
         fixed=body.fixed, masses=body.masses,
     )  # fmt: skip
     start = kicked(body, np.random.default_rng(2))
-    rotated = mcmj.trajectory.State(start.positions @ turn.T, start.velocities @ turn.T)
+    rotated = mcmj.core.trajectory.State(start.positions @ turn.T, start.velocities @ turn.T)
     runs = [
         integrate(b, method="rk4", steps=500, initial_state=s)
         for b, s in ((body, start), (turned, rotated))

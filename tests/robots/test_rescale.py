@@ -54,5 +54,5 @@ def test_factors_undo_each_other(body):
 
 @pytest.mark.parametrize("name", ["pace", "size", "mass"])
 def test_factors_are_positive(body, name):
-    with pytest.raises(mcmj.errors.InvalidArgumentError, match=f"{name}: expected"):
+    with pytest.raises(mcmj.utils.errors.InvalidArgumentError, match=f"{name}: expected"):
         rescaled(body, **{name: 0.0})

@@ -20,7 +20,7 @@ def test_matrices_are_the_derivatives_of_the_forces():
         positions, velocities = where.copy(), np.zeros_like(where)
         positions[body.free] += q.reshape(-1, 2)
         velocities[body.free] = v.reshape(-1, 2)
-        push = body.w_fb @ (gate * (mcmj.body.spring_lengths(positions, body.springs) @ w_out))
+        push = body.w_fb @ (gate * (mcmj.core.body.spring_lengths(positions, body.springs) @ w_out))
         change = accelerations(body, positions, velocities, push) * body.masses[:, None]
         return change[body.free].ravel()
 

@@ -38,7 +38,7 @@ def loses_stability(body, integrator, step, w_out=None, steps=2400):
     for _ in range(4):
         try:
             run = sim.rollout(steps // 4, record=("lengths", "velocities"))
-        except mcmj.errors.DivergenceError:
+        except mcmj.utils.errors.DivergenceError:
             return True
         parts.append(np.abs(run.velocities).max())
     return parts[3] > max(1.02 * parts[1], 1e-11) or max(parts) > 1e-3

@@ -32,7 +32,7 @@ def kicked(body, speed=0.5):
     """The body's start with every free node moving at that speed."""
     v = np.random.default_rng(9).normal(size=body.positions.shape)
     v *= speed / np.linalg.norm(v, axis=1)[:, None]
-    return mcmj.trajectory.State(body.positions, np.where(body.fixed[:, None], 0.0, v))
+    return mcmj.core.trajectory.State(body.positions, np.where(body.fixed[:, None], 0.0, v))
 
 
 def error(state, exact):

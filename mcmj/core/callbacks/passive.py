@@ -1,12 +1,12 @@
 """MuJoCo's passive force callback: custom spring laws, and what the leapfrog adds.
 
 MuJoCo holds one such callback per process, so one does both, each for the models that ask for
-it, and nothing for others. A tendon with user data [TAG, key of the law (mcmj.lawtable), l0,
+it, and nothing for others. A tendon with user data [TAG, key of the law (callbacks.law_table), l0,
 k1, k3, d1, d3] is pulled through its sparse Jacobian by
 
     law(l - l0, dl/dt, k1, k3, d1, d3)
 
-With COUPLED_TAG in place of TAG the law is called once, for all springs (mcmj.coupled_laws).
+With COUPLED_TAG in place of TAG the law is called once, for all springs (callbacks.coupled_laws).
 Under the leapfrog dl/dt is the extrapolated one.
 """
 

@@ -1,4 +1,4 @@
-"""A standard algorithm learns to drive a body by its input channel, in mcmj.environment.
+"""A standard algorithm learns to drive a body by its input channel, as a dm_control task.
 
 A readout taught by teacher forcing alone keeps its rhythm, but need not find it from total
 rest. The cross-entropy method (Rubinstein and Kroese, 2004) searches for an input signal over

@@ -45,7 +45,8 @@ class Config:
         seed: of the random body and the noise.
         seeds: number of random bodies of consecutive seeds, for rates.
         profile: input during teaching: ramp, mixed, or your own, such as
-            "log 0.1 5 320, hold 5 60" (mcmj.profiles). It should end where the inputs jump from.
+            "log 0.1 5 320, hold 5 60" (targets.input_profiles). It should end
+            where the inputs jump from.
         run_in: at the profile's first value, before it; not learned from [s].
         inputs: constant inputs to jump to, each from the state after teaching.
         curve: more of them, for amplitude and frequency against the input.

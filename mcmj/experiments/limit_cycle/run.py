@@ -37,7 +37,7 @@ class TaskResult:
         times, outputs: (T,) [s] and (T, n_outputs) of the free run; its time goes on from
             teacher forcing, so the target's value at the same moment is target.sample(times).
         positions: (window, N, 2) of the nodes during the last window [m]; None from the twin.
-        windows: errors in consecutive windows, see mcmj.freerun.window_errors.
+        windows: errors in consecutive windows, see mcmj.learning.free_run.window_errors.
     """
 
     target: Target

@@ -101,7 +101,7 @@ class SwingUp:
         swing_up_time: until the outputs stay within the tolerance of the orbit [s], infinite
             if they do not.
         w_out: the readout after practice; None if teaching blew up.
-        practice_errors: of the trials, see mcmj.practice; empty if teaching blew up.
+        practice_errors: of the trials, see mcmj.learning.practice; empty if teaching blew up.
         kicked_fraction: of the kicked starts, that came to the orbit; None without any.
     """
 

@@ -29,7 +29,7 @@ class Config:
         parts: besides: regression: the same readouts by plain regression under a noisy teacher;
             rest: from standing still; push: count falls; switch: of the readout while walking;
             steps: the same walk at other time steps.
-        pace: of the gaits, as many times faster than mcmj.gaits.
+        pace: of the gaits, as many times faster than mcmj.targets.gaits.
         walking: a walk of each gait after learning [s] ..
         judged: .. whose last part is measured [s].
         teaching: what the regression learns from [s]; its noise and ridge are those of learning.

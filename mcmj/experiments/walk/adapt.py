@@ -1,7 +1,7 @@
 """The ground as part of the computer: does the rhythm adapt to it if the legs' loads enter?
 
 Every ground is walked on from several moments of the stride, by the body that does not feel it
-(no coupling) and by the one that was taught with it (mcmj.grounding).
+(no coupling) and by the one that was taught with it (mcmj.robots.ground_training).
 """
 
 import numpy as np

@@ -77,7 +77,7 @@ class Physics(mujoco.Physics):
 class Orbit(base.Task):
     """Generate a target's orbit; the agent acts on input channels and fed-back outputs.
 
-    Reward in [0, 1] from the orbit error of the last period (mcmj.orbit_window). It says where
+    Reward in [0, 1] from the orbit error of the last period (metrics.orbit_window). It says where
     the outputs are, not how fast they go round.
 
     Args:

@@ -1,4 +1,4 @@
-"""The environments of mcmj.environment for Gymnasium; needs the extra "gym".
+"""The environments of mcmj.learning.environments.environment for Gymnasium; needs the extra "gym".
 
 gymnasium.make("mcmj.learning.environments.gymnasium_env:mcmj/Orbit-v0", name="quadratic")
 """
@@ -20,11 +20,11 @@ ID = "mcmj/Orbit-v0"
 
 
 class OrbitEnv(gymnasium.Env[dict[str, Any], Array]):
-    """A body that is to generate an orbit; see mcmj.environment.Orbit.
+    """A body that is to generate an orbit; see mcmj.learning.environments.environment.Orbit.
 
     Args:
-        name, task, setting: as for mcmj.environment.load.
-        environment: an environment made by mcmj.environment.make, instead of a name.
+        name, task, setting: as for mcmj.learning.environments.environment.load.
+        environment: an environment made by environment.make, instead of a name.
         render_mode: None or "rgb_array".
     """
 

@@ -1,4 +1,4 @@
-"""What an agent may do in an environment of mcmj.environment; no dm_control here."""
+"""What an agent may do in an environment; no dm_control here."""
 
 from dataclasses import dataclass
 

@@ -73,7 +73,7 @@ def stability_limit(
     at most 1 / s.
 
     Args:
-        integrator: a name of mcmj.integrators, or a compiled twin's.
+        integrator: a name of mcmj.core.integrators, or a compiled twin's.
         speed, elongation: largest spring rate [m/s] and elongation [m] expected; numbers or (L,).
         secant: where motions of that size grow, and not small errors on top of them: a longer
             step, at which a run may survive as noise.

@@ -1,4 +1,4 @@
-"""Trajectories on disk with their body: NPZ, or Zarr (mcmj.zarr_file) by the file's suffix."""
+"""Trajectories on disk with their body: NPZ, or Zarr by the file's suffix."""
 
 import json
 from collections.abc import Iterable, Mapping
