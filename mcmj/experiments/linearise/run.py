@@ -1,9 +1,8 @@
 """Feedback linearisability, and why an array needs diversity (Hauser et al. 2012, app. B, D, E).
 
-The conditions LI and INV by symbols (analysis.lie_brackets); the controllability matrix of arrays
-of
-linear springs as their stiffnesses become equal; and the same arrays in MuJoCo as a fading
-memory: a linear readout of the lengths filters the input with a Gaussian kernel of the past.
+The conditions LI and INV by symbols (analysis.lie_brackets); the controllability matrix of
+arrays of linear springs as their stiffnesses become equal; and the same arrays in MuJoCo as a
+fading memory: a linear readout of the lengths filters the input with a Gaussian kernel of the past.
 Equal springs all say the same, and one spring is no memory to choose from.
 """
 
