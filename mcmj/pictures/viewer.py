@@ -201,8 +201,8 @@ class Plots:
         self._outputs: deque[Array] = deque(maxlen=round(SHOWN * FPS))
         self._reach = 1e-12
         colours = ("black", "blue", "green", "orange")[:n_outputs]
-        names = [f"x{c + 1} {colour}" for c, colour in enumerate(colours)]
-        self._traces, self._plane = _figure(", ".join(names)), _figure("x2 over x1")
+        self._traces, self._plane = _figure(", ".join(colours)), _figure("x2 over x1")
+        self._traces.xlabel = f"x1 to x{n_outputs} over time [s]"
 
     def add(self, now: float, outputs: Array) -> None:
         """One sample more; time that goes back clears the plots."""
@@ -216,7 +216,7 @@ class Plots:
     def figures(self, width: int, height: int) -> list[tuple[mujoco.MjrRect, mujoco.MjvFigure]]:
         """Both figures at the right edge of a window of that many pixels."""
         times, outputs = np.array(self._times), np.array(self._outputs)
-        reach, end = 1.1 * self._reach, times[-1]
+        reach, end = _round_up(1.05 * self._reach), times[-1]
         shown = times > end - SHOWN
         times, outputs = times[shown], outputs[shown]
         size = min(width // 3, height // 2)
@@ -231,11 +231,18 @@ class Plots:
         return placed
 
 
+def _round_up(reach: float) -> float:
+    """To 1, 2, 3 or 5 times a power of ten: else MuJoCo does it, on the vertical axis only."""
+    power = 10.0 ** np.floor(np.log10(reach))
+    return float(min(m * power for m in (1, 2, 3, 5, 10) if m * power >= reach))
+
+
 def _figure(title: str) -> mujoco.MjvFigure:
     figure = mujoco.MjvFigure()
     mujoco.mjv_defaultFigure(figure)
     figure.title = title
     figure.flg_legend = 0
+    figure.xformat = figure.yformat = "%.2g"
     figure.gridsize[:] = 3, 3
     figure.figurergba[:] = 1.0, 1.0, 1.0, 0.8
     figure.panergba[:] = 1.0, 1.0, 1.0, 1.0

@@ -106,7 +106,7 @@ def draw_scores(
         threshold, color=TARGET_COLOUR, ls="--", lw=1, label=f"success {side} {threshold:g}"
     )
     axes.set(xlabel=name, ylabel="share of the bodies with less", ylim=(0, 1.02))
-    axes.legend(loc="lower right", framealpha=0.9, edgecolor="none")
+    axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.15), ncols=2, frameon=False)
     axes.grid(alpha=0.3)
 
 
