@@ -114,11 +114,12 @@ def test_an_interrupt_leaves_nothing_half_written(tmp_path):
 
 
 def test_success_rate(tmp_path):
-    options = ["--seeds", "2", "--first-seed", "5", "--nodes", "10", "--duration", "6"]
+    options = ["--seeds", "2", "--seed", "5", "--nodes", "10", "--duration", "6"]
     options += ["--washout", "2", "--free-run", "20", "--quiet", "--out", tmp_path]
     status, _, err = run("success_rate", *options)
     assert status == 0, err
     document = metrics_of(tmp_path)
+    assert document["scenario"] == "success_rate"
     assert document["metrics"]["all_tasks"]["of"] == 2
     body, w_out = mcmj.from_mjcf(tmp_path / "best.xml")
     assert w_out is None

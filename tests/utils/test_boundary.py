@@ -23,7 +23,6 @@ from mcmj.experiments.prune import run as prune
 from mcmj.experiments.render import run as render
 from mcmj.experiments.search import run as search
 from mcmj.experiments.speed_accuracy import run as speed_accuracy
-from mcmj.experiments.success_rate import run as success_rate
 from mcmj.experiments.swing_up import run as swing_up
 from mcmj.experiments.trunk import config as trunk_config
 from mcmj.experiments.walk import config as walk_config
@@ -52,7 +51,6 @@ ABSURD = {  # in the default settings otherwise
     trunk_config: {"walking": 1e12, "teaching": 1e12, "pushes": 10**9},
     benchmark_config: {"sizes": (10**9,), "nodes": 10**9, "memory_steps": 10**12, "repeats": 10**9},
     perturb: {"timestep": 1e-320, "before": 1e12, "seeds": 10**9},
-    success_rate: {"seeds": 10**9, "free_run": 1e12},
     certify_config: {"free_run": 1e12, "copies": 10**9},
     gaits_config: {"before": 1e12, "phases": 10**9},
     input_driven_config: {"free_run": 1e12, "sweep": 1e12},

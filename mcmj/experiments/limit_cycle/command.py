@@ -1,20 +1,24 @@
 """The command: limit_cycle."""
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
 from rich.console import Console
 from rich.table import Table
 
+from mcmj.core.random_body import draw_body
 from mcmj.experiments.base import Experiment
 from mcmj.experiments.limit_cycle.config import Config, total_steps
 from mcmj.experiments.limit_cycle.run import Result, run
+from mcmj.experiments.limit_cycle.seeds import SuccessOfSeeds
 from mcmj.mjcf.write import to_mjcf
 from mcmj.pictures import plotting
 from mcmj.pictures.rendering import limit_cycle_video
 from mcmj.utils import files
 from mcmj.utils.progress import progress_bar
+from mcmj.utils.success_rates import rate_cells
 
 
 def write(result: Result, out: Path) -> None:
@@ -25,7 +29,7 @@ def write(result: Result, out: Path) -> None:
         result.body,
         timestep=config.timestep,
         integrator=config.integrator,
-        w_out=next(iter(readouts.values())),
+        w_out=next(iter(readouts.values()), None),
         readouts=readouts,
         provenance={"body": result.source, "config": files.plain(config)},
     )
@@ -34,17 +38,41 @@ def write(result: Result, out: Path) -> None:
     for name, task in tasks.items():
         arrays[f"{name}/start_time"], arrays[f"{name}/outputs"] = task.times[0], task.outputs
     files.write_arrays(out / "trajectory.npz", arrays, config, config.noise_seed)
+    if result.seeds is not None:
+        files.write_text(out / "best.xml", best_body(config, result.seeds))
+
+
+def best_body(config: Config, seeds: SuccessOfSeeds) -> str:
+    """MJCF of the best body, with its provenance; no readout: it is soon taught."""
+    seed, last = seeds.best_seed, seeds.first_seed + config.seeds - 1
+    errors = {name: e[seed - seeds.first_seed] for name, e in seeds.orbit_errors.items()}
+    provenance = {
+        "seed": seed,
+        "settings": files.plain(config.settings),
+        "selected": f"best of seeds {seeds.first_seed} to {last}",
+        "orbit_errors": files.plain(errors),
+        "free_run": config.free_run,
+        "teaching": files.plain(config.teaching),
+        "versions": files.versions(),
+    }
+    return to_mjcf(draw_body(seed, config.settings), provenance=provenance)
 
 
 def figures(result: Result) -> dict[str, Figure]:
-    """Fig. 5."""
-    figure = plotting.limit_cycle_figure(
+    """Fig. 5; the errors of all bodies."""
+    found = {}
+    if result.seeds is not None:
+        errors, threshold = result.seeds.orbit_errors, result.config.threshold
+        found["success_rate"] = plotting.success_figure(errors, threshold)
+    if not result.tasks:
+        return found
+    found["limit_cycle"] = plotting.limit_cycle_figure(
         result.body,
         [(task.target, task.times, task.outputs, task.errors) for task in result.tasks.values()],
         free_run=result.config.free_run,
         window=result.config.window,
     )
-    return {"limit_cycle": figure}
+    return found
 
 
 def write_videos(result: Result, out: Path) -> None:
@@ -79,11 +107,30 @@ def show(result: Result, console: Console) -> None:
             f"{task.fit.train_nrmse:.2e}" if task.fit else "not taught",
         )
     console.print(table)
+    if result.seeds is not None:
+        show_seeds(result, console)
     if result.steps_per_second is not None:
         console.print(
             f"{result.body!r}: {result.steps_per_second:,.0f} steps a second in closed loop, "
             f"{result.closed_loop_cost_ratio:.2f} x a bare mj_step loop"
         )
+
+
+def show_seeds(result: Result, console: Console) -> None:
+    """How many of the bodies learned it."""
+    assert result.seeds is not None
+    table = Table(title=f"orbit error below {100 * result.config.threshold:g} %")
+    for column in ("task", "bodies", "95 % interval", "median orbit error", "median period error"):
+        table.add_column(column)
+    rows: dict[str, Any] = result.seeds.metrics
+    for name, row in rows.items():
+        errors = [
+            f"{100 * row[key]:.3f} %" if key in row else ""
+            for key in ("median_orbit_error", "median_period_error")
+        ]
+        table.add_row(name, *rate_cells(row), *errors)
+    console.print(table)
+    console.print(f"best body: seed {result.seeds.best_seed}, written to best.xml")
 
 
 EXPERIMENT = Experiment(

@@ -12,7 +12,13 @@ from mcmj.metrics import orbits
 from mcmj.mjcf.bundled import open_body
 from mcmj.targets.limit_cycles import TARGETS, Target, target
 from mcmj.utils.errors import InvalidArgumentError, UnknownNameError
-from mcmj.utils.validation import Array, require_duration, require_number, require_timestep
+from mcmj.utils.validation import (
+    Array,
+    require_count,
+    require_duration,
+    require_number,
+    require_timestep,
+)
 
 Found = tuple[Body, dict[str, Array], dict[str, object]]  # what get_body gives
 
@@ -27,6 +33,9 @@ class Config:
             body, unless a seed or changed settings ask for a new random one. If the file
             holds a readout for the task, nothing is taught.
         seed: of the random body and of the noise; default 0.
+        seeds: number of bodies, random ones of consecutive seeds if more than one. The first is
+            shown; of all it is counted how many learn it.
+        threshold: largest orbit error of a success.
         free_run: length of the free run in closed loop [s].
         window: the errors are those of this last part of it [s].
         timestep: control and physics step [s].
@@ -42,6 +51,8 @@ class Config:
     task: str = "all"
     body: str | None = None
     seed: int | None = None
+    seeds: int = 1
+    threshold: float = 0.05
     free_run: float = 120.0
     window: float = 20.0
     timestep: float = 1e-3
@@ -55,6 +66,8 @@ class Config:
     def __post_init__(self) -> None:
         if self.task not in (*TARGETS, "all"):
             raise UnknownNameError("task", self.task, [*TARGETS, "all"])
+        require_count("seeds", self.seeds, 1)
+        require_number("threshold", self.threshold, 0.0, open_low=True)
         require_timestep("timestep", self.timestep)
         require_duration("free_run", self.free_run, self.timestep)
         require_number("window", self.window, 0.0, self.free_run, open_low=True)
@@ -71,6 +84,9 @@ class Config:
                 ", ".join(changed), "no settings beside a body, which has its own", self.body
             )
 
+        if self.seeds > 1 and self.body is not None:
+            raise InvalidArgumentError("body", "none beside seeds, which draw theirs", self.body)
+
     @property
     def tasks(self) -> tuple[str, ...]:
         """Names of the targets to learn."""
@@ -84,7 +100,8 @@ class Config:
 
 def get_body(config: Config) -> Found:
     """The config's body, the readouts that came with it, and where it comes from."""
-    if config.body is None and (config.seed is not None or config.settings != BodySettings()):
+    drawn = config.seed is not None or config.seeds > 1 or config.settings != BodySettings()
+    if config.body is None and drawn:
         body = draw_body(config.noise_seed, config.settings)
         return body, {}, {"seed": config.noise_seed, "settings": asdict(config.settings)}
     stored = open_body("general" if config.body is None else config.body)
@@ -98,7 +115,7 @@ def get_body(config: Config) -> Found:
 def total_steps(config: Config) -> int:
     """Control steps of a whole run, for a progress bar."""
     seconds = config.teaching.total + config.free_run
-    return len(config.tasks) * round(seconds / config.timestep)
+    return config.seeds * len(config.tasks) * round(seconds / config.timestep)
 
 
 def check_task(config: Config, body: Body, wanted: Target) -> None:

@@ -3,14 +3,16 @@
 import hashlib
 from collections.abc import Mapping
 from contextlib import nullcontext
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from mcmj.core.body import Body
 from mcmj.experiments.limit_cycle.config import Config, Found, check_task, get_body
 from mcmj.experiments.limit_cycle.loop_cost import closed_loop_cost
+from mcmj.experiments.limit_cycle.seeds import SuccessOfSeeds
 from mcmj.learning.free_run import free_run, resume, window_errors
 from mcmj.learning.regression import Fit
 from mcmj.learning.teaching import synchronise, teach
@@ -52,7 +54,12 @@ class TaskResult:
 
 @dataclass(frozen=True)
 class Result:
-    """All tasks of one body, and what the closed loop costs, if that was measured."""
+    """All tasks of one body, and what the closed loop costs, if that was measured.
+
+    Attributes:
+        tasks: without those on which one of several bodies blew up.
+        seeds: how all bodies did, if there are several.
+    """
 
     config: Config
     body: Body
@@ -61,6 +68,7 @@ class Result:
     checkpoints: dict[str, Checkpoint]
     steps_per_second: float | None
     closed_loop_cost_ratio: float | None
+    seeds: SuccessOfSeeds | None = None
 
     @property
     def readouts(self) -> dict[str, Array]:
@@ -70,7 +78,7 @@ class Result:
     @property
     def metrics(self) -> dict[str, object]:
         """As written to metrics.json."""
-        table: dict[str, object] = {}
+        table: dict[str, Any] = {}
         for name, task in self.tasks.items():
             fit = task.fit
             table[name] = {
@@ -79,6 +87,10 @@ class Result:
                 "condition_number": fit.condition_number if fit else None,
                 "windows": task.windows,
             }
+        if self.seeds is not None:
+            for name, row in self.seeds.metrics.items():
+                table[name] = {**table.get(name, {}), **row}
+            table["best_seed"] = self.seeds.best_seed
         table["steps_per_second"] = self.steps_per_second
         table["closed_loop_cost_ratio"] = self.closed_loop_cost_ratio
         return table
@@ -87,6 +99,9 @@ class Result:
         """Delete them: once results are written, a run need not go on."""
         for checkpoint in self.checkpoints.values():
             checkpoint.remove()
+
+
+Outcomes = dict[str, TaskResult | DivergenceError]
 
 
 def checkpoints(config: Config, folder: Path, found: Found) -> dict[str, Checkpoint]:
@@ -121,16 +136,43 @@ def run(
         outcomes = run_tasks(config, found, kept, on_steps=on_steps)
     tasks = {}
     for name, outcome in outcomes.items():
-        if isinstance(outcome, DivergenceError):
+        if not isinstance(outcome, DivergenceError):
+            tasks[name] = outcome
+        elif config.seeds == 1:
             raise outcome
-        tasks[name] = outcome
-    if not config.measure_cost:
-        return Result(config, body, source, tasks, kept, None, None)
-    w_out = next(iter(tasks.values())).w_out
-    speed, ratio = closed_loop_cost(
-        body, w_out, timestep=config.timestep, integrator=config.integrator
+    speed = ratio = None
+    if config.measure_cost and tasks:
+        w_out = next(iter(tasks.values())).w_out
+        speed, ratio = closed_loop_cost(
+            body, w_out, timestep=config.timestep, integrator=config.integrator
+        )
+    seeds = _over_seeds(config, outcomes, on_steps) if config.seeds > 1 else None
+    return Result(config, body, source, tasks, kept, speed, ratio, seeds)
+
+
+def _over_seeds(config: Config, first: Outcomes, on_steps: OnSteps) -> SuccessOfSeeds:
+    """The outcomes of all bodies; one that blows up is a failure."""
+    found = [_error_pairs(first)]
+    for seed in range(config.noise_seed + 1, config.noise_seed + config.seeds):
+        one = replace(config, seed=seed, seeds=1)
+        found.append(_error_pairs(run_tasks(one, get_body(one), on_steps=on_steps)))
+    errors = {name: np.array([pairs[name] for pairs in found]) for name in config.tasks}
+    return SuccessOfSeeds(
+        config.noise_seed,
+        config.threshold,
+        {name: pairs[:, 0] for name, pairs in errors.items()},
+        {name: pairs[:, 1] for name, pairs in errors.items()},
     )
-    return Result(config, body, source, tasks, kept, speed, ratio)
+
+
+def _error_pairs(outcomes: Outcomes) -> dict[str, tuple[float, float]]:
+    """Orbit and period errors by task; infinite where the body blew up."""
+    return {
+        name: (np.inf, np.inf)
+        if isinstance(outcome, DivergenceError)
+        else (outcome.errors["orbit_error"], outcome.errors["period_error"])
+        for name, outcome in outcomes.items()
+    }
 
 
 def run_tasks(
@@ -139,7 +181,7 @@ def run_tasks(
     kept: Mapping[str, Checkpoint] = {},
     *,
     on_steps: OnSteps = lambda steps: None,
-) -> dict[str, TaskResult | DivergenceError]:
+) -> Outcomes:
     """Teach and run every task, on several threads; a task that blew up is its error.
 
     Args:

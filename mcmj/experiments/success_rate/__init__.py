@@ -1,6 +1,6 @@
 """How many random bodies learn all three limit cycles.
 
-Bodies of consecutive seeds.
+The same as limit_cycle --seeds 50 --free-run 60 --windows 0 --no-measure-cost.
 """
 
-GROUP = "search"
+GROUP = "the paper"
