@@ -3,98 +3,83 @@
 from collections.abc import Mapping
 from pathlib import Path
 
-import imageio_ffmpeg
-import mediapy
 import mujoco
 import numpy as np
-import numpy.typing as npt
-from PIL import Image, ImageDraw, ImageFont
 
-from mcmj.pictures.walk_video import FPS, INK, Event, GaitDiagram, strain_colours
-from mcmj.robots.trunk_walker import TrunkWalker
-from mcmj.robots.walk_metrics import joined
-from mcmj.utils.errors import McmjError
-from mcmj.utils.files import whole_file
+from mcmj.pictures.opengl import new_renderer
+from mcmj.pictures.video_file import Picture, new_video
+from mcmj.pictures.walk_video import (
+    FPS,
+    HEIGHT,
+    SIDE,
+    WIDTH,
+    Event,
+    GaitDiagram,
+    draw_words,
+    shown_rows,
+    spring_strains,
+    strain_words,
+)
+from mcmj.robots.trunk import Trunk
+from mcmj.robots.walk_metrics import Walk, joined
+from mcmj.utils.colours import BLACK, MUSCLE_COLOUR, strain_colours
 from mcmj.utils.validation import Array
 
-Frame = npt.NDArray[np.uint8]
 
-WIDTH, HEIGHT = 640, 480  # pixels of the robot's picture; the diagram is beside it
-FULL_STRAIN = 0.05
-MUSCLE = (0.49, 0.23, 0.62)
-
-
-def trunk_video(path: str | Path, walkers: Mapping[str, TrunkWalker], *, shown: float) -> None:
-    """Film gaits one after the other in real time, each going on from where its walker is.
+def trunk_video(
+    path: str | Path, model: mujoco.MjModel, trunk: Trunk, walks: Mapping[str, Walk]
+) -> None:
+    """Film walks of one robot, one after the other, in real time.
 
     Args:
-        walkers: by gait, in closed loop; of one robot.
-        shown: time of each [s].
+        model: of the robot.
+        walks: by gait, with joints; of the same sampling.
 
     Raises:
-        McmjError: no OpenGL.
+        RenderingUnavailableError: no OpenGL.
         OutputError: the file cannot be written.
     """
-    mediapy.set_ffmpeg(imageio_ffmpeg.get_ffmpeg_exe())
-    walks = [walker.walk(shown, joints=True) for walker in walkers.values()]
-    walk = joined(walks)
-    events = [Event(index * shown, name) for index, name in enumerate(walkers)]
-    diagram = GaitDiagram(walk, events)
-    first = next(iter(walkers.values()))
-    rows = np.searchsorted(walk.times, np.arange(0, walk.times[-1] - walk.sample, 1 / FPS))
-    assert walk.joints is not None
-    with whole_file(Path(path)) as temporary, _renderer(first.model) as renderer:
-        target = temporary.with_suffix(".mp4")
-        side = diagram.draw(0.0)
-        shape = (HEIGHT, WIDTH + side.shape[1])
-        with mediapy.VideoWriter(target, shape, fps=FPS, crf=25) as video:
-            for row in rows:
-                picture = _picture(first, renderer, walk.joints[0, row], walk.trunk[0, row])
-                beside = np.full((HEIGHT, side.shape[1], 3), 255, dtype=np.uint8)
-                drawn = diagram.draw(walk.times[row])
-                beside[HEIGHT - len(drawn) :] = drawn
-                _legend(beside)
-                video.add_image(np.hstack([picture, beside]))
+    walk = joined(list(walks.values()))
+    ends = np.cumsum([len(one.times) for one in walks.values()]) * walk.sample
+    starts = [0.0, *ends.tolist()]
+    diagram = GaitDiagram(walk, [Event(*event) for event in zip(starts, walks, strict=False)])
+    rows, joints = shown_rows(walk)
+    springs = np.arange(trunk.n_sensed)
+    strains = spring_strains(model, springs, joints)
+    words = [
+        ("The trunk's springs are all that", BLACK),
+        ("drives its muscles.", BLACK),
+        *strain_words(strains),
+        ("muscles", MUSCLE_COLOUR),
+    ]
+    beside = np.full((HEIGHT, SIDE, 3), 255, dtype=np.uint8)
+    legend = draw_words(words, SIDE)
+    beside[16 : 16 + len(legend)] = legend
+    model.tendon_rgba[trunk.n_sensed : trunk.body.n_springs, :3] = MUSCLE_COLOUR
+    with (
+        new_renderer(model, WIDTH, HEIGHT) as renderer,
+        new_video(path, WIDTH + SIDE, HEIGHT, fps=FPS) as video,
+    ):
+        for row, qpos, colours in zip(
+            rows, joints, strain_colours(strains, np.abs(strains).max()), strict=True
+        ):
+            model.tendon_rgba[springs, :3] = colours
+            centre = np.array([walk.trunk[0, row, 0], 0.8 * trunk.settings.leg, 0.0])
+            drawn = diagram.draw(walk.times[row])
+            beside[-len(drawn) :] = drawn
+            video.add_image(np.hstack([_picture(model, renderer, qpos, centre), beside]))
 
 
-def _picture(walker: TrunkWalker, renderer: mujoco.Renderer, qpos: Array, trunk: Array) -> Frame:
-    """The robot in the middle of the picture, springs coloured by strain."""
-    model, n = walker.model, walker.trunk.n_sensed
-    data = mujoco.MjData(model)
+def _picture(
+    model: mujoco.MjModel, renderer: mujoco.Renderer, qpos: Array, centre: Array
+) -> Picture:
+    """The robot from the side, with a point in the middle of the picture."""
+    data, camera = mujoco.MjData(model), mujoco.MjvCamera()
     data.qpos[:] = qpos
     mujoco.mj_forward(model, data)
-    rest = walker.trunk.body.rest_lengths[:n]
-    model.tendon_rgba[:n, :3] = strain_colours(data.ten_length[:n] / rest - 1, FULL_STRAIN)
-    model.tendon_rgba[n : walker.trunk.body.n_springs, :3] = MUSCLE
-    camera = mujoco.MjvCamera()
     camera.type = mujoco.mjtCamera.mjCAMERA_FREE
-    camera.lookat[:] = [trunk[0], 0.8 * walker.trunk.settings.leg, 0.0]
+    camera.lookat[:] = centre
     # along -z with y upwards, from a little above the ground
     camera.distance, camera.azimuth, camera.elevation = 3.4, 90.0, -100.0
     renderer.update_scene(data, camera)
-    return renderer.render().copy()
-
-
-def _legend(beside: Frame) -> None:
-    """Words above the gait diagram, drawn in place."""
-    picture = Image.fromarray(beside)
-    draw = ImageDraw.Draw(picture)
-    font = ImageFont.load_default(size=14)
-    words = (
-        ("The trunk's springs are all that", INK),
-        ("drives its muscles.", INK),
-        (f"stretched by {FULL_STRAIN:.0%} or more", (214, 38, 41)),
-        (f"shortened by {FULL_STRAIN:.0%} or more", (31, 79, 214)),
-        ("muscles", tuple(int(255 * c) for c in MUSCLE)),
-    )
-    for line, (text, colour) in enumerate(words):
-        draw.text((16, 24 + 26 * line), text, fill=colour, font=font)
-    beside[:] = np.asarray(picture)
-
-
-def _renderer(model: mujoco.MjModel) -> mujoco.Renderer:
-    model.vis.global_.offwidth, model.vis.global_.offheight = WIDTH, HEIGHT
-    try:
-        return mujoco.Renderer(model, HEIGHT, WIDTH)
-    except Exception as error:  # each OpenGL backend raises errors of its own
-        raise McmjError(f"no off-screen OpenGL ({type(error).__name__}: {error})") from error
+    return renderer.render()

@@ -1,27 +1,34 @@
 """MP4 of a walk: the robot, the body that drives it, and the gait diagram running beside them."""
 
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
-import imageio_ffmpeg
-import mediapy
 import mujoco
 import numpy as np
 import numpy.typing as npt
 from PIL import Image, ImageDraw, ImageFont
 from scipy.ndimage import binary_closing
 
+from mcmj.pictures.opengl import new_renderer
+from mcmj.pictures.video_file import Picture, new_video
 from mcmj.robots.quadruped import ROBOT_GROUP
 from mcmj.robots.walk_metrics import Walk
 from mcmj.robots.walk_scene import GROUND_GROUP, ROBOT
 from mcmj.targets.gaits import LEGS
-from mcmj.utils.errors import McmjError
-from mcmj.utils.files import whole_file
+from mcmj.utils.colours import (
+    BLACK,
+    BLUE,
+    CHANGE_COLOUR,
+    SHORTENED_COLOUR,
+    STRETCHED_COLOUR,
+    Colour,
+    in_bytes,
+    strain_colours,
+)
 from mcmj.utils.validation import Array
 
-Frame = npt.NDArray[np.uint8]
+Indices = npt.NDArray[np.int64]
 
 WIDTH, HEIGHT, SIDE = 640, 480, 320  # pixels: the robot's picture; width of the column beside it
 BODY = 230  # height of the body's picture
@@ -30,9 +37,7 @@ SHADOW = 1024  # pixels of the map: without shadows feet seem to float
 GAP = 0.05  # s; feet bounce: shorter gaps in a bar of the diagram are closed
 SHOWN = 3.0  # seconds of the gait diagram, the last at its right edge
 LARGEST = 0.08  # largest displacement of a node as drawn, over the size of the picture
-FULL_STRAIN = 0.005  # at which a spring has its full colour
-INK, BAR, MARK = (30, 30, 30), (40, 60, 110), (224, 123, 0)
-STRETCHED, SHORTENED, SLACK = (0.84, 0.15, 0.16), (0.12, 0.31, 0.84), (0.55, 0.58, 0.62)
+INK, BAR, MARK = in_bytes(BLACK), in_bytes(BLUE), in_bytes(CHANGE_COLOUR)
 
 
 @dataclass(frozen=True)
@@ -54,23 +59,64 @@ def walk_video(
         events: in the order of time, the first at the start.
 
     Raises:
-        McmjError: no OpenGL.
+        RenderingUnavailableError: no OpenGL.
         OutputError: the file cannot be written.
     """
-    assert walk.joints is not None
-    mediapy.set_ffmpeg(imageio_ffmpeg.get_ffmpeg_exe())
-    shown = np.arange(0, walk.times[-1] - walk.sample, 1 / FPS)
-    rows = np.searchsorted(walk.times, shown)
+    rows, joints = shown_rows(walk)
+    springs = np.flatnonzero(model.tendon_stiffness > 0)
+    strains = spring_strains(model, springs, joints)
+    colours = strain_colours(strains, np.abs(strains).max())
+    legend = draw_words(strain_words(strains), SIDE, columns=2)
     diagram = GaitDiagram(walk, events)
-    with whole_file(Path(path)) as temporary, _renderers(model) as (robot, body):
-        shape, target = (HEIGHT, WIDTH + SIDE), temporary.with_suffix(".mp4")
-        with mediapy.VideoWriter(target, shape, fps=FPS, crf=25) as video:
-            camera = _camera(model)
-            for row, pictures in zip(
-                rows, _pictures(model, robot, body, camera, walk.joints[0, rows]), strict=True
-            ):
-                side = np.vstack([pictures[1], diagram.draw(walk.times[row])])
-                video.add_image(np.hstack([pictures[0], side]))
+    model.vis.quality.shadowsize = SHADOW
+    with (
+        new_renderer(model, WIDTH, HEIGHT) as robot,
+        new_renderer(model, SIDE, BODY) as body,
+        new_video(path, WIDTH + SIDE, HEIGHT, fps=FPS) as video,
+    ):
+        pictures = _pictures(model, robot, body, joints, springs, colours)
+        for row, (robot_picture, body_picture) in zip(rows, pictures, strict=True):
+            top = body_picture[: len(legend)]
+            np.minimum(top, legend, out=top)  # words are dark, the ground is white
+            side = np.vstack([body_picture, diagram.draw(walk.times[row])])
+            video.add_image(np.hstack([robot_picture, side]))
+
+
+def shown_rows(walk: Walk) -> tuple[Indices, Array]:
+    """Rows (F,) of a walk that a film in real time shows, and the first copy's joints there."""
+    assert walk.joints is not None
+    rows = np.searchsorted(walk.times, np.arange(0, walk.times[-1] - walk.sample, 1 / FPS))
+    return rows, walk.joints[0, rows]
+
+
+def spring_strains(model: mujoco.MjModel, springs: Indices, joints: Array) -> Array:
+    """Strains (F, L) of springs, given by their tendons (L,), at joints (F, nq)."""
+    data, strains = mujoco.MjData(model), []
+    for qpos in joints:
+        data.qpos[:] = qpos
+        mujoco.mj_fwdPosition(model, data)
+        strains.append(data.ten_length[springs] / model.tendon_lengthspring[springs, 0] - 1)
+    return np.array(strains)
+
+
+def strain_words(strains: Array) -> list[tuple[str, Colour]]:
+    """What the springs' colours mean."""
+    percent = 100 * np.abs(strains).max()
+    return [
+        (f"stretched {percent:.2g} %", STRETCHED_COLOUR),
+        (f"shortened {percent:.2g} %", SHORTENED_COLOUR),
+    ]
+
+
+def draw_words(words: Sequence[tuple[str, Colour]], width: int, *, columns: int = 1) -> Picture:
+    """Words in their colours on white, in rows of so many."""
+    line, font = 24, ImageFont.load_default(size=14)
+    picture = Image.new("RGB", (width, -(-len(words) // columns) * line), "white")
+    draw = ImageDraw.Draw(picture)
+    for place, (text, colour) in enumerate(words):
+        at = (12 + place % columns * width / columns, 2 + place // columns * line)
+        draw.text(at, text, fill=in_bytes(colour), font=font)
+    return np.asarray(picture)
 
 
 class GaitDiagram:
@@ -82,7 +128,7 @@ class GaitDiagram:
         self._contact = binary_closing(walk.contact[0] > 0, closing)
         self._font = ImageFont.load_default(size=16)
 
-    def draw(self, now: float) -> Frame:
+    def draw(self, now: float) -> Picture:
         """The diagram at a time [s]."""
         height, left, top, row = HEIGHT - BODY, 40, 48, 42
         picture = Image.new("RGB", (SIDE, height), "white")
@@ -112,45 +158,31 @@ class GaitDiagram:
 
 
 def _pictures(
-    model: mujoco.MjModel,
-    robot: mujoco.Renderer,
-    body: mujoco.Renderer,
-    camera: mujoco.MjvCamera,
-    joints: Array,
-) -> Iterator[tuple[Frame, Frame]]:
+    model: mujoco.MjModel, robot: mujoco.Renderer, body: mujoco.Renderer, joints: Array,
+    springs: Indices, colours: Array,
+) -> Iterator[tuple[Picture, Picture]]:  # fmt: skip
     """Pictures of the robot, and of its body with displacements magnified."""
-    data = mujoco.MjData(model)
+    data, camera = mujoco.MjData(model), _camera(model)
     trunk = model.body(ROBOT + "trunk")
     nodes = model.jnt_qposadr[trunk.jntadr[0]]
-    springs = model.tendon_stiffness > 0
-    rest = model.tendon_lengthspring[springs, 0]
     magnified = LARGEST * model.stat.extent / np.abs(joints[:, :nodes]).max()
     only_robot, only_body = mujoco.MjvOption(), mujoco.MjvOption()
     for groups in (only_robot.geomgroup, only_robot.sitegroup, only_robot.tendongroup):
         groups[:] = 0
     only_robot.geomgroup[[ROBOT_GROUP, GROUND_GROUP]] = 1
     only_body.geomgroup[[ROBOT_GROUP, GROUND_GROUP]] = 0
-    for qpos in joints:
+    for qpos, shown in zip(joints, colours, strict=True):
         data.qpos[:] = qpos
         mujoco.mj_forward(model, data)
-        model.tendon_rgba[springs, :3] = strain_colours(
-            data.ten_length[springs] / rest - 1, FULL_STRAIN
-        )
         model.light_active[:] = True
         robot.update_scene(data, camera, only_robot)
         picture = robot.render().copy()
         data.qpos[:nodes] *= magnified
         mujoco.mj_forward(model, data)
+        model.tendon_rgba[springs, :3] = shown
         model.light_active[:] = False
         body.update_scene(data, "top", only_body)
         yield picture, body.render().copy()
-
-
-def strain_colours(strain: Array, full: float) -> Array:
-    """Colours (n, 3): blue when shortened, red when stretched, full at the strain `full`."""
-    weight = np.minimum(np.abs(strain) / full, 1.0)[:, None]
-    goal = np.where(strain[:, None] > 0, STRETCHED, SHORTENED)
-    return (1 - weight) * np.array(SLACK) + weight * goal
 
 
 def _camera(model: mujoco.MjModel) -> mujoco.MjvCamera:
@@ -160,15 +192,3 @@ def _camera(model: mujoco.MjModel) -> mujoco.MjvCamera:
     camera.trackbodyid = model.body(ROBOT + "trunk").id
     camera.distance, camera.azimuth, camera.elevation = 7.5, 115.0, -12.0
     return camera
-
-
-@contextmanager
-def _renderers(model: mujoco.MjModel) -> Iterator[tuple[mujoco.Renderer, mujoco.Renderer]]:
-    model.vis.global_.offwidth, model.vis.global_.offheight = WIDTH, HEIGHT
-    model.vis.quality.shadowsize = SHADOW
-    try:
-        robot = mujoco.Renderer(model, HEIGHT, WIDTH)
-    except Exception as error:  # each OpenGL backend raises errors of its own
-        raise McmjError(f"no off-screen OpenGL ({type(error).__name__}: {error})") from error
-    with robot, mujoco.Renderer(model, BODY, SIDE) as body:
-        yield robot, body

@@ -49,11 +49,12 @@ def strain_colours(strains: Array, largest: float) -> Array:
         largest: of the whole film or scene: only there a colour is full, so that none saturates.
     """
     share = np.abs(strains) / largest if largest > 0.0 else np.zeros_like(strains)
-    weight = np.sqrt(share)[..., None]  # small strains show too
+    weight = np.cbrt(share)[..., None]  # one very short spring must not make all others grey
     goal = np.where(strains[..., None] > 0, STRETCHED_COLOUR, SHORTENED_COLOUR)
     return (1 - weight) * np.array(SPRING_COLOUR) + weight * goal
 
 
-def largest_strain(strains: Array) -> float:
-    """Of any spring at any time, as `strain_colours` needs it; 0 without springs."""
-    return float(np.abs(strains).max(initial=0.0))
+def in_bytes(colour: Colour) -> tuple[int, int, int]:
+    """Red, green, blue in 0 .. 255, as Pillow takes them."""
+    red, green, blue = (round(255 * c) for c in colour)
+    return red, green, blue

@@ -47,7 +47,9 @@ def film(result: Result, out: Path) -> None:
     walkers = {
         name: gait.walker() for name, gait in result.gaits.items() if gait.learned is not None
     }
-    trunk_video(out / "trunk.mp4", walkers, shown=SHOWN)
+    walks = {name: walker.walk(SHOWN, joints=True) for name, walker in walkers.items()}
+    first = next(iter(walkers.values()))
+    trunk_video(out / "trunk.mp4", first.model, first.trunk, walks)
 
 
 def show(result: Result, console: Console) -> None:
