@@ -6,11 +6,10 @@ linear, static readout of its spring lengths is trained (Hauser et al., Biol. Cy
 Names are loaded when they are first used, so that `import mcmj` costs little.
 """
 
-import ctypes.util
 import importlib
-import os
-import sys
 from typing import TYPE_CHECKING
+
+from mcmj.utils.gl_backend import choose_backend
 
 if TYPE_CHECKING:
     from mcmj import reference as reference
@@ -69,14 +68,4 @@ def __dir__() -> list[str]:
     return sorted({*globals(), *_PLACES, "reference"})
 
 
-def _choose_gl() -> None:
-    """Without a display MuJoCo must be told, before its import, how to draw off-screen."""
-    if sys.platform != "linux" or "MUJOCO_GL" in os.environ or os.environ.get("DISPLAY"):
-        return
-    for backend, library in (("egl", "EGL"), ("osmesa", "OSMesa")):
-        if ctypes.util.find_library(library):
-            os.environ["MUJOCO_GL"] = backend
-            return
-
-
-_choose_gl()
+choose_backend()  # MuJoCo reads it at import

@@ -19,6 +19,7 @@ from mcmj.experiments.base import Experiment, Output, carry_out
 from mcmj.experiments.registry import GROUPS, entries, experiment_named
 from mcmj.utils.errors import McmjError, McmjWarning
 from mcmj.utils.files import only_run, prepare_folder
+from mcmj.utils.gl_backend import check_backend
 
 LONGEST_NAME = 80  # of a folder
 
@@ -51,6 +52,7 @@ def overview() -> None:
 
 def command(experiment: Experiment, arguments: Sequence[str]) -> None:
     """Parse the options of an experiment, and carry it out."""
+    check_backend()
     config, output = parse(experiment, arguments)
     folder = prepare_folder(output.out or default_folder(experiment, config))
     with only_run(folder):

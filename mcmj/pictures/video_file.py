@@ -10,7 +10,7 @@ import mediapy
 import numpy as np
 import numpy.typing as npt
 
-from mcmj.utils.errors import InvalidArgumentError
+from mcmj.utils.errors import InvalidArgumentError, OutputError
 from mcmj.utils.files import whole_file
 
 Picture = npt.NDArray[np.uint8]  # (height, width, 3)
@@ -25,14 +25,20 @@ def new_video(
 
     Raises:
         InvalidArgumentError: neither .mp4 nor .gif.
-        OutputError: the file cannot be written.
+        OutputError: the file cannot be written, as when the disk is full.
     """
     suffix = Path(path).suffix
     if suffix not in OPTIONS:
         raise InvalidArgumentError("path", f"a name that ends with {' or '.join(OPTIONS)}", path)
     mediapy.set_ffmpeg(imageio_ffmpeg.get_ffmpeg_exe())
-    with (
-        whole_file(path) as temporary,
-        mediapy.VideoWriter(temporary, (height, width), fps=fps, **OPTIONS[suffix]) as video,
-    ):
-        yield video
+    with whole_file(path) as temporary:
+        try:
+            size = (height, width)
+            with mediapy.VideoWriter(temporary, size, fps=fps, **OPTIONS[suffix]) as video:
+                yield video
+        except (RuntimeError, BrokenPipeError) as error:
+            said = str(error)
+            if isinstance(error, RuntimeError) and not said.startswith("Error writing"):
+                raise  # not mediapy's
+            reason = "no space left" if "No space left" in said else "ffmpeg failed, disk full?"
+            raise OutputError(f"cannot write {path}: {reason}") from error
