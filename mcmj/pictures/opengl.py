@@ -9,6 +9,7 @@ import sys
 import mujoco
 
 from mcmj.utils.errors import McmjError
+from mcmj.utils.gl_backend import check_backend
 
 REMEDY = "on Debian or Ubuntu: apt-get install libegl1 libegl-mesa0 libgl1-mesa-dri libopengl0"
 
@@ -22,7 +23,9 @@ def new_renderer(model: mujoco.MjModel, width: int, height: int) -> mujoco.Rende
 
     Raises:
         RenderingUnavailableError: no OpenGL context can be made.
+        UnknownNameError: MUJOCO_GL is none of MuJoCo's choices.
     """
+    check_backend()
     chosen = os.environ.get("MUJOCO_GL") or os.environ.get("DISPLAY")
     if sys.platform == "linux" and not chosen:
         raise RenderingUnavailableError(f"no display, no EGL and no OSMesa library; {REMEDY}")

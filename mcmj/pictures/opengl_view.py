@@ -28,11 +28,9 @@ class GLView:
 
     Raises:
         RenderingUnavailableError: no OpenGL context can be made.
-        UnknownNameError: MUJOCO_GL is none of MuJoCo's choices.
     """
 
     def __init__(self, body: Body, width: int, height: int, *, samples: int = 0) -> None:
-        check_backend()
         self._body = body
         self._model = model = load_model(to_mjcf(body))
         model.vis.quality.offsamples = samples

@@ -160,15 +160,12 @@ def write_film(
     if count < 2:
         raise InvalidArgumentError("film", "long enough for two frames", f"{film.times[-1]:g} s")
     kept = set(np.linspace(0, count - 1, stills + 1).round().astype(int)[1:].tolist())
-    whole = (HEIGHT, WIDTH + PANEL_WIDTH)
-    reduced = (whole[0] // GIF_SHARE, whole[1] // GIF_SHARE)
     with ExitStack() as stack:
         mp4 = stack.enter_context(_video(paths[".mp4"], style.fps, 1)) if ".mp4" in paths else None
         gif = (
             stack.enter_context(_video(paths[".gif"], style.fps, GIF_SHARE))
             if ".gif" in paths
             else None
-            for suffix, shape, share in ((".mp4", whole, 1), (".gif", reduced, GIF_SHARE))
         )
         for number, picture in enumerate(film_frames(film, style, report=report)):
             if mp4 is not None:
