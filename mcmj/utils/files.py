@@ -125,6 +125,8 @@ def whole_file(path: str | Path, *, folder: bool = False) -> Iterator[Path]:
             shutil.rmtree(final, ignore_errors=True)
         os.replace(temporary, final)
         sync(final.parent)
+    except OutputError:
+        raise  # says already what failed
     except OSError as error:
         raise OutputError(f"cannot write {final}: {error.strerror or error}") from error
     finally:
