@@ -90,6 +90,10 @@ class Body:
 
     __hash__ = None  # type: ignore[assignment]
 
+    def __reduce__(self) -> tuple[type["Body"], tuple[npt.NDArray, ...]]:
+        """Copies and what is unpickled come from the constructor: checked, and read-only."""
+        return type(self), tuple(getattr(self, field.name) for field in fields(self))
+
     @property
     def n_nodes(self) -> int:
         """N."""

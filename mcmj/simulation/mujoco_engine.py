@@ -22,6 +22,7 @@ from mcmj.mjcf.read import load_model
 from mcmj.mjcf.write import to_mjcf
 from mcmj.simulation.damage import alter
 from mcmj.utils.errors import DivergenceError
+from mcmj.utils.forking import guard_against_forks
 from mcmj.utils.quiet import quiet_warnings
 from mcmj.utils.validation import Array, as_array, require_count
 
@@ -62,6 +63,8 @@ class Engine:
         if law is not None:
             self.model.tendon_user[: body.n_springs, 1] = law.key(body.n_springs)
         self._batch = Batch(self.model, copies, threads)
+        if threads > 1:
+            guard_against_forks(self)
         self._x_dofs = 2 * np.arange(len(body.free))  # joints are n<i>x, n<i>y in node order
         self.steps_done = 0
         self.reset()

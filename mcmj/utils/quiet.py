@@ -1,6 +1,7 @@
 """Keep MuJoCo from printing warnings and writing MUJOCO_LOG.TXT: we report them ourselves."""
 
 import ctypes
+import os
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -8,6 +9,10 @@ from contextlib import contextmanager
 import mujoco
 
 _lock = threading.Lock()
+if hasattr(os, "register_at_fork"):  # else a child waits for a thread that it does not have
+    os.register_at_fork(
+        before=_lock.acquire, after_in_parent=_lock.release, after_in_child=_lock.release
+    )
 _depth = 0
 _before: object = None
 

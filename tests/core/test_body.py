@@ -1,6 +1,8 @@
 """Body: what is accepted, what is refused and by which name, what is read-only."""
 
+import copy
 import dataclasses
+import pickle
 
 import numpy as np
 import pytest
@@ -136,6 +138,17 @@ def test_sizes():
     assert sizes == (4, 5, 3, 2)
     assert body.free.tolist() == [1, 2, 3]
     assert repr(body) == "Body(4 nodes, 5 springs, 1 fixed, 3 inputs, 2 outputs)"
+
+
+@pytest.mark.parametrize(
+    "copied", [copy.copy, copy.deepcopy, lambda body: pickle.loads(pickle.dumps(body))]
+)
+def test_copies_are_read_only_too(copied, body):
+    again = copied(body)
+    assert again == body
+    assert again is not body
+    for field in dataclasses.fields(again):
+        assert not getattr(again, field.name).flags.writeable, field.name
 
 
 def test_arrays_are_read_only_and_frozen():
