@@ -29,6 +29,7 @@ from threadpoolctl import threadpool_limits
 
 from mcmj.core.integrators import DEFAULT_INTEGRATOR
 from mcmj.core.random_body import draw_body
+from mcmj.metrics.metric_paths import matched, numbers_at, quantity
 from mcmj.mjcf.bundled import body_path
 from mcmj.mjcf.write import to_mjcf
 from mcmj.search.overrides import override
@@ -40,7 +41,6 @@ from mcmj.utils.errors import (
     UnknownNameError,
 )
 from mcmj.utils.files import plain, versions
-from mcmj.utils.metric_paths import matched, numbers_at, quantity
 
 PACKAGE = "mcmj.experiments"
 ORBIT_ERRORS = "*/orbit_error"
@@ -189,7 +189,7 @@ class Score:
     """The number that a search is after.
 
     Attributes:
-        path: into the metrics, see utils.metric_paths; where it has a "*", the worst number counts.
+        path: into the metrics, see metrics.metric_paths; where it has a "*", the worst number counts.
         threshold: a success is below it (above it, if maximised).
         maximise: large is good.
     """

@@ -5,8 +5,8 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 import numpy.typing as npt
 
+from mcmj.metrics.success_rates import success_rate
 from mcmj.search.space import Range, Space
-from mcmj.utils.success_rates import success_rate
 
 BINS = 6  # of a random range
 
@@ -24,7 +24,7 @@ def success_by_setting(
     Returns:
         By path, one row a value (or bin of a random range, with as many settings as the
         others): value, a number, text or list; low and high of a bin; the counts and interval
-        of mcmj.utils.success_rates.success_rate.
+        of mcmj.metrics.success_rates.success_rate.
     """
     table: dict[str, list[dict[str, object]]] = {}
     for path, part in space.items():

@@ -11,11 +11,11 @@ from mcmj.learning.practice import Practice, practise
 from mcmj.learning.regression import Regression
 from mcmj.learning.teaching import Course, lessons_of
 from mcmj.metrics.orbits import orbit_distances, orbit_error, recovery_time
+from mcmj.metrics.success_rates import success_rate
 from mcmj.simulation.simulation import Simulation
 from mcmj.targets.limit_cycles import target
 from mcmj.utils.errors import DivergenceError, InvalidArgumentError, UnknownNameError
 from mcmj.utils.seeds import stream
-from mcmj.utils.success_rates import success_rate
 
 QUICK = perturb.Config(
     settings=BodySettings(nodes=12),

@@ -9,9 +9,9 @@ from mcmj.experiments.gaits.config import Config
 from mcmj.learning.regression import Fit
 from mcmj.metrics import gaits as gaitmetrics
 from mcmj.metrics import orbits
+from mcmj.metrics.success_rates import success_rate
 from mcmj.targets.gaits import LEGS
 from mcmj.targets.limit_cycles import Target
-from mcmj.utils.success_rates import success_rate
 from mcmj.utils.validation import Array
 
 KINDS = ("free_run", "switch", "from_rest", "all")  # what a body may succeed in

@@ -10,8 +10,8 @@ from rich.table import Table
 from mcmj.experiments.base import Experiment
 from mcmj.experiments.guided.run import Config, OnSetting, Result, run
 from mcmj.experiments.search.figure import guided_figure
+from mcmj.metrics.success_rates import rate_cells
 from mcmj.utils.progress import trial_bar
-from mcmj.utils.success_rates import rate_cells
 
 
 def resume(config: Config, folder: Path, on_steps: OnSetting) -> Result:

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from mcmj.metrics.success_rates import success_rate
 from mcmj.search.database import TrialStore
 from mcmj.search.experiment import Score, Trial, default_score, make_config
 from mcmj.search.overrides import override, parse_assignment, value_at
@@ -15,7 +16,6 @@ from mcmj.search.study import Study
 from mcmj.search.workers import Workers, open_workers
 from mcmj.utils.errors import InvalidArgumentError, UnknownNameError
 from mcmj.utils.files import plain
-from mcmj.utils.success_rates import success_rate
 from mcmj.utils.validation import Array, require_count, require_number
 
 WORST_LOG = 1.0  # log10 of the score that counts for everything worse, blow-ups too

@@ -9,8 +9,8 @@ from mcmj.experiments.input_driven.config import Config, Start
 from mcmj.experiments.input_driven.sweep import Sweep
 from mcmj.learning.practice import Practised
 from mcmj.metrics import orbits
+from mcmj.metrics.success_rates import success_rate
 from mcmj.targets.limit_cycles import Target
-from mcmj.utils.success_rates import success_rate
 from mcmj.utils.validation import Array
 
 

@@ -13,12 +13,12 @@ from mcmj.experiments.base import Experiment
 from mcmj.experiments.limit_cycle.config import Config, total_steps
 from mcmj.experiments.limit_cycle.run import Result, run
 from mcmj.experiments.limit_cycle.seeds import SuccessOfSeeds
+from mcmj.metrics.success_rates import rate_cells
 from mcmj.mjcf.write import to_mjcf
 from mcmj.pictures import plotting
 from mcmj.pictures.rendering import limit_cycle_video
 from mcmj.utils import files
 from mcmj.utils.progress import progress_bar
-from mcmj.utils.success_rates import rate_cells
 
 
 def write(result: Result, out: Path) -> None:

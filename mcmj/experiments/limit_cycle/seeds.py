@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mcmj.utils.success_rates import success_rate
+from mcmj.metrics.success_rates import success_rate
 from mcmj.utils.validation import Array
 
 

@@ -11,13 +11,13 @@ from mcmj.core.random_body import BodySettings, draw_body
 from mcmj.learning.regression import Fit
 from mcmj.learning.teaching import Teaching, teach
 from mcmj.metrics import orbits
+from mcmj.metrics.success_rates import success_rate
 from mcmj.mjcf.bundled import open_body
 from mcmj.simulation.run_phases import Phase, RandomForces, Schedule, run_schedule
 from mcmj.simulation.simulation import Simulation
 from mcmj.targets.limit_cycles import TARGETS, Target, target
 from mcmj.utils.errors import DivergenceError, InvalidArgumentError, UnknownNameError
 from mcmj.utils.progress import OnSteps
-from mcmj.utils.success_rates import success_rate
 from mcmj.utils.validation import (
     Array,
     require_count,

@@ -10,9 +10,9 @@ from typing import Any
 
 import numpy as np
 
+from mcmj.metrics.metric_paths import numbers_at
+from mcmj.metrics.success_rates import success_rate
 from mcmj.utils.errors import UnknownNameError
-from mcmj.utils.metric_paths import numbers_at
-from mcmj.utils.success_rates import success_rate
 
 FORMATS = {"error": "{:.2%}", "time": "{:.1f} s", "ratio": "{:.3f}"}
 
@@ -41,7 +41,7 @@ class Claim:
         text: what is claimed.
         paper: the paper's value, or its words.
         run: name of the run whose metrics hold ours.
-        paths: into them, see utils.metric_paths; all numbers that they lead to are taken together.
+        paths: into them, see metrics.metric_paths; all numbers that they lead to are taken together.
         kind: of number, one of FORMATS.
         limit: a value at or below it is a success; None counts as a failure.
         needed: the claim holds unless the successes refute this rate: unless the upper end of
@@ -73,7 +73,7 @@ class Outcome:
 
     Attributes:
         values: our values, infinite where there is none.
-        rate: counts of successes, see mcmj.utils.success_rates.
+        rate: counts of successes, see mcmj.metrics.success_rates.
         holds: whether enough of them are successes.
     """
 

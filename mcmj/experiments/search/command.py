@@ -11,13 +11,13 @@ from rich.table import Table
 from mcmj.experiments.base import Experiment
 from mcmj.experiments.search.figure import best_bodies_figure, score_figure, success_rate_figure
 from mcmj.experiments.search.run import Config, OnTrial, Result, run, total_trials
+from mcmj.metrics.success_rates import rate_cells
 from mcmj.mjcf.read import from_mjcf
 from mcmj.search.database import TrialStore
 from mcmj.search.export import write_csv, write_parquet
 from mcmj.utils import files
 from mcmj.utils.errors import McmjError
 from mcmj.utils.progress import trial_bar
-from mcmj.utils.success_rates import rate_cells
 
 
 def resume(config: Config, folder: Path, on_steps: OnTrial) -> Result:

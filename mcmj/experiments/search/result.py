@@ -6,9 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from mcmj.experiments.search.config import Config
+from mcmj.metrics.success_rates import success_rate
 from mcmj.search.experiment import Score
 from mcmj.search.summary import success_by_setting
-from mcmj.utils.success_rates import success_rate
 from mcmj.utils.validation import Array
 
 

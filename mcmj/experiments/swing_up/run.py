@@ -11,12 +11,12 @@ from mcmj.learning.lessons import Teaching
 from mcmj.learning.practice import Practice, practise
 from mcmj.learning.teaching import Course, lessons_of
 from mcmj.metrics import orbits
+from mcmj.metrics.success_rates import success_rate
 from mcmj.simulation.simulation import Simulation
 from mcmj.targets.limit_cycles import Target, target
 from mcmj.utils.errors import DivergenceError, InvalidArgumentError
 from mcmj.utils.progress import OnSteps
 from mcmj.utils.seeds import stream
-from mcmj.utils.success_rates import success_rate
 from mcmj.utils.threads import in_threads
 from mcmj.utils.validation import Array, require_count, require_number
 

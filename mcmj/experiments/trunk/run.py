@@ -12,6 +12,7 @@ import numpy as np
 from mcmj.experiments.trunk.config import Config
 from mcmj.metrics import gaits as gaitmetrics
 from mcmj.metrics import orbits as metrics
+from mcmj.metrics.success_rates import success_rate
 from mcmj.robots import walk_metrics
 from mcmj.robots.force_learning import Learned, force_learn, learn_by_regression, trial_error
 from mcmj.robots.quadruped import GRAVITY
@@ -21,7 +22,6 @@ from mcmj.robots.walk_metrics import Walk
 from mcmj.targets.limit_cycles import Target
 from mcmj.utils.errors import DivergenceError
 from mcmj.utils.progress import OnSteps
-from mcmj.utils.success_rates import success_rate
 from mcmj.utils.threads import in_threads
 from mcmj.utils.validation import Array
 

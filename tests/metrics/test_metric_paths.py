@@ -6,8 +6,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from mcmj.metrics.metric_paths import matched, numbers_at, quantity
 from mcmj.utils.errors import UnknownNameError
-from mcmj.utils.metric_paths import matched, numbers_at, quantity
 
 METRICS = {
     "eps": {"0.2": {"orbit_error": 0.1, "rounds": 3}, "5": {"orbit_error": None}},
