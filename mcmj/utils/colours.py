@@ -49,7 +49,7 @@ def strain_colours(strains: Array, largest: float) -> Array:
         largest: of the whole film or scene: only there a colour is full, so that none saturates.
     """
     share = np.abs(strains) / largest if largest > 0.0 else np.zeros_like(strains)
-    weight = np.cbrt(share)[..., None]  # one very short spring must not make all others grey
+    weight = share[..., None] ** 0.25  # one very short spring must not make all others grey
     goal = np.where(strains[..., None] > 0, STRETCHED_COLOUR, SHORTENED_COLOUR)
     return (1 - weight) * np.array(SPRING_COLOUR) + weight * goal
 
