@@ -1,7 +1,8 @@
 """Frames of a film: the body's picture with words on it, beside outputs that draw themselves.
 
 The axes are matplotlib's, drawn once; a frame restores them and draws only what is new
-("blitting"). That takes 1.3 times as long as lines and letters set by hand with Pillow did.
+("blitting"). That takes 1.02 times as long (medians of 7 films of 625 frames) as lines and letters
+set by hand with Pillow did, which had neither ticks nor units.
 """
 
 import numpy as np
@@ -46,7 +47,8 @@ class FilmFigure:
         share = width / (width + panel)
         words = self._figure.add_axes((0.0, 0.0, share, 1.0))
         _draw_legends(words, film)
-        self._time = words.text(0.015, 0.015, "", fontsize=LARGE, animated=True)
+        words.text(0.015, 0.015, "t =", fontsize=LARGE)
+        self._time = words.text(0.06, 0.015, "", fontsize=LARGE, animated=True)
         self._label = words.text(
             0.5, 0.98, "", fontsize=LARGE, animated=True, color=CHANGE_COLOUR, ha="center", va="top"
         )
@@ -64,6 +66,7 @@ class FilmFigure:
         self._traces = _Traces(self._figure.add_subplot(rows), film)
         self._canvas.draw()
         self._ground = self._canvas.copy_from_bbox(self._figure.bbox)
+        self._no_label = self._canvas.copy_from_bbox(words.bbox)
 
     def draw(self, picture: Picture, index: int) -> Picture:
         """The frame of sample `index` around a picture (height, width, 3) of the body."""
@@ -73,17 +76,23 @@ class FilmFigure:
         for part in (self._plane, self._traces):
             if part is not None:
                 part.extend(new)
+        self._set_label(self._film.label(index))
         self._ground = self._canvas.copy_from_bbox(self._figure.bbox)
         if self._plane is not None:
             self._plane.draw_trail(index)
-        self._time.set_text(f"t = {self._film.times[index]:.1f} s")
-        self._label.set_text(self._film.label(index))
-        for text in (self._time, self._label):
-            self._figure.draw_artist(text)
+        self._time.set_text(f"{self._film.times[index]:.1f} s")
+        self._figure.draw_artist(self._time)
         frame = np.array(Image.fromarray(np.asarray(self._canvas.buffer_rgba())).convert("RGB"))
         words = frame[:, : self._width]
         np.minimum(words, picture, out=words)  # the words are dark, the ground is white
         return frame
+
+    def _set_label(self, label: str) -> None:
+        """Letters take longest to draw: these are kept while they stay the same."""
+        if label != self._label.get_text():
+            self._canvas.restore_region(self._no_label)
+            self._label.set_text(label)
+            self._figure.draw_artist(self._label)
 
 
 class _Plane:
