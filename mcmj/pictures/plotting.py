@@ -183,10 +183,8 @@ def success_figure(orbit_errors: dict[str, Array], threshold: float) -> Figure:
             np.arange(1, len(errors) + 1), np.sort(np.minimum(errors, top)), ".-", ms=4, lw=0.8,
             color=colour, label=f"{TITLES.get(name, name)}: {good} of {len(errors)}",
         )  # fmt: skip
-    axes.axhline(threshold, color=TARGET_COLOUR, ls="--", lw=1)
-    axes.annotate(
-        f"success below {100 * threshold:g} %", (1, threshold * 1.08), color=TARGET_COLOUR
-    )
+    label = f"success below {100 * threshold:g} %"
+    axes.axhline(threshold, color=TARGET_COLOUR, ls="--", lw=1, label=label)
     axes.set(xlabel="body, sorted by error (each task for itself)", ylabel="orbit error")
     axes.legend(frameon=False)
     axes.grid(alpha=0.3)
