@@ -189,7 +189,7 @@ class Score:
     """The number that a search is after.
 
     Attributes:
-        path: into the metrics, see metrics.metric_paths; where it has a "*", the worst number counts.
+        path: into the metrics, see metric_paths; where it has a "*", the worst number counts.
         threshold: a success is below it (above it, if maximised).
         maximise: large is good.
     """

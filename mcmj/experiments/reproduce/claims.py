@@ -41,7 +41,7 @@ class Claim:
         text: what is claimed.
         paper: the paper's value, or its words.
         run: name of the run whose metrics hold ours.
-        paths: into them, see metrics.metric_paths; all numbers that they lead to are taken together.
+        paths: into them, see metric_paths; all numbers that they lead to are taken together.
         kind: of number, one of FORMATS.
         limit: a value at or below it is a success; None counts as a failure.
         needed: the claim holds unless the successes refute this rate: unless the upper end of
