@@ -20,21 +20,21 @@ TINY = {
     "benchmark": "--steps 20 --repeats 1 --sizes 10 --memory-steps 1000",
     "capacity": "--nodes 8 --symbols 150 --washout 20 --max-delays 5 2 --streams 6 "
     "--stream-symbols 12 --no-maps",
-    "certify": "--task quadratic --body quadratic --free-run 15 --window 13 --recovery 15 "
-    "--scales 1 --phases 1 --kicks 0.5 --pushes 1 --copies 2 --refine 2",
+    "certify": "--task quadratic --body quadratic --free-run 15 --window 13 --recovery 22 "
+    "--scales 1 --phases 1 --kicks 0.5 --pushes 1 --copies 4 --refine 2",
     "drive": "--nodes 8 --rounds 1 --population 2 --elites 2 --time-limit 8 --drive 4",
     "emulate": "--targets van_der_pol --integrators Euler --steps-ms 1 2 --horizon 1",
     "filters": "--tasks volterra --nodes 10 --train 3 --washout 1 --test 2 --engine twin",
     "gaits": "--gaits trot pace --seed 3 --nodes 12 --engine twin --duration 10 --washout 4 "
-    "--free-run 8 --before 5 --after 10 --from-rest 8 --window 8 --rounds 0",
+    "--free-run 8 --before 5 --after 10 --from-rest 8 --window 8 --rounds 0 --phases 2",
     "guided": "--experiment limit_cycle --vary teaching.noise=log(0.05,0.5) --set task=quadratic "
     "settings.nodes=12 teaching.duration=12.0 teaching.washout=4.0 free_run=14.0 window=12.0 "
     "--settings 3 --bodies 1 --judged 1 --confirm 0 --workers 1",
-    "hard_cases": "--cases stiff --integrators Euler --duration 0.05 --most-steps 200",
-    "input_driven": "--engine twin --seed 1 --nodes 20 --free-run 30 --window 13 --sweep 0 "
-    "--rounds 0 --curve 0.5",
+    "hard_cases": "--cases ordinary --integrators Euler --duration 0.05 --most-steps 200",
+    "input_driven": "--engine twin --seed 1 --nodes 15 --free-run 14 --window 13 --sweep 0 "
+    "--rounds 0 --inputs 1 --curve 2",
     "limit_cycle": "--task quadratic --seed 3 --nodes 12 --duration 8 --washout 2 --free-run 13 "
-    "--window 12",
+    "--window 12 --no-measure-cost",
     "linearise": "--sizes 2 --memory-sizes 2 --diversities 1 0.1 --train 5 --test 2 --washout 1 "
     "--symbolic-masses 2",
     "perturb": f"{TAUGHT} --before 1 --window 1 --after 15 --error-window 12 --noise-curve 0.1",
@@ -43,9 +43,9 @@ TINY = {
     "search": "--seeds 2 --set task=quadratic settings.nodes=12 teaching.duration=12.0 "
     "teaching.washout=4.0 free_run=14.0 window=12.0 --confirm 1 --audit 1 --cost-trials 2 "
     "--workers 1",
-    "speed_accuracy": "--bodies toolbox_n10 --methods mujoco_euler --steps-ms 1 2 --repeats 1 "
+    "speed_accuracy": "--bodies toolbox_n10 --methods mujoco_Euler mujoco_RK4 --steps-ms 1 2 --repeats 1 "
     "--no-attractor",
-    "success_rate": "--seeds 1 --nodes 10 --duration 6 --washout 2 --free-run 14 --window 13",
+    "success_rate": "--seeds 2 --nodes 10 --duration 6 --washout 2 --free-run 20 --window 19 --engine twin",
     "swing_up": f"{TAUGHT} --free-run 15 --window 12 --kicks 1 --rounds 0 --trial 13 "
     "--trial-window 12",
     "trunk": "--gaits trot --parts --walking 3 --judged 1 --rounds 1 --round-duration 4 --trial 2",
@@ -53,7 +53,9 @@ TINY = {
 }
 APART = {"reproduce", "view"}  # commands of commands, and a person; tested on their own
 TIMED = ("*second*", "*_ms", "*ratio*", "*cost*", "*speed*", "*memory*", "*start*", "*import*",
-         "growth*", "machine*", "*overhead*", "*us_per*")  # fmt: skip
+         "growth*", "machine*", "*overhead*", "*us_per*", "*ns_per*",
+         "*_mb")  # fmt: skip
+SLOW = dict.fromkeys(("benchmark", "certify", "input_driven"), pytest.mark.slow)
 BAD = {  # an option that the experiment must refuse by its name, where it is not --seed
     "render": ("--stills", "0"), "guided": ("--bodies", "0"), "search": ("--seeds", "0"),
     "success_rate": ("--seeds", "0"), "gaits": ("--seeds", "0"), "limit_cycle": ("--window", "-1"),
@@ -92,7 +94,7 @@ def test_the_registry_is_complete():
         experiment_named("waltz")
 
 
-@pytest.mark.parametrize("name", TINY)
+@pytest.mark.parametrize("name", [pytest.param(name, marks=SLOW.get(name, ())) for name in TINY])
 def test_an_experiment_runs_is_deterministic_and_draws(name, tmp_path):
     one, two = (carried_out(name, tmp_path / place) for place in ("one", "two"))
     assert one["scenario"] == name

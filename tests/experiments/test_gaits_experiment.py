@@ -144,7 +144,8 @@ def test_the_committed_body_has_its_four_readouts():
     drawn = mcmj.core.random_body.draw_body(
         source["body"]["seed"], BodySettings(**source["body"]["settings"])
     )
-    assert drawn == body
+    for name in drawn.__dataclass_fields__:  # exp and log differ in the last digit by machine
+        np.testing.assert_allclose(getattr(drawn, name), getattr(body, name), rtol=1e-14)
 
 
 @pytest.mark.slow
