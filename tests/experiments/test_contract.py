@@ -43,9 +43,10 @@ TINY = {
     "search": "--seeds 2 --set task=quadratic settings.nodes=12 teaching.duration=12.0 "
     "teaching.washout=4.0 free_run=14.0 window=12.0 --confirm 1 --audit 1 --cost-trials 2 "
     "--workers 1",
-    "speed_accuracy": "--bodies toolbox_n10 --methods mujoco_Euler mujoco_RK4 --steps-ms 1 2 --repeats 1 "
-    "--no-attractor",
-    "success_rate": "--seeds 2 --nodes 10 --duration 6 --washout 2 --free-run 20 --window 19 --engine twin",
+    "speed_accuracy": "--bodies toolbox_n10 --methods mujoco_Euler mujoco_RK4 --steps-ms 1 2 "
+    "--repeats 1 --no-attractor",
+    "success_rate": "--seeds 2 --nodes 10 --duration 6 --washout 2 --free-run 20 --window 19 "
+    "--engine twin",
     "swing_up": f"{TAUGHT} --free-run 15 --window 12 --kicks 1 --rounds 0 --trial 13 "
     "--trial-window 12",
     "trunk": "--gaits trot --parts --walking 3 --judged 1 --rounds 1 --round-duration 4 --trial 2",

@@ -26,7 +26,8 @@ def start_up(config: Config, body: Body) -> dict[str, object]:
     """Seconds to import, and to import and install the callbacks from Numba's cache."""
     snippets = {
         "import_seconds": "import mcmj",
-        "import_and_callbacks_seconds": "from mcmj.core.callbacks.install import install; install(passive=True)",
+        "import_and_callbacks_seconds": "from mcmj.core.callbacks import install\n"
+        "install.install(passive=True)",
     }
     seconds = interleaved_seconds(
         {
