@@ -38,6 +38,17 @@ def test_commands_and_linked_files_exist(page):
         assert link.startswith("http") or (page.parent / link).is_file(), link
 
 
+def test_the_tests_of_the_promises_exist():
+    page = (ROOT / "docs" / "trust.md").read_text()
+    for row in re.findall(r"^\|.*\|$", page, re.M)[2:]:
+        path = None
+        named = re.findall(r"`(tests/[\w/]+\.py)?(?:::(\w+))?`", row.split("|")[3])
+        assert named, row
+        for file, test in named:
+            path = ROOT / file if file else path
+            assert not test or f"def {test}(" in path.read_text(), (row, test)
+
+
 def test_first_two_commands_run_the_main_job_and_the_tests():
     commands = re.findall(r"^(sh scripts/run\.sh \w+)", README.read_text(), re.M)
     assert commands[:2] == ["sh scripts/run.sh limit_cycle", "sh scripts/run.sh test"]
