@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from mcmj.simulation.phases import Phase as Phase
     from mcmj.simulation.phases import RandomForces as RandomForces
     from mcmj.simulation.phases import Schedule as Schedule
+    from mcmj.simulation.reservoir import Reservoir as Reservoir
     from mcmj.simulation.run_phases import run_schedule as run_schedule
     from mcmj.simulation.simulation import Simulation as Simulation
     from mcmj.targets.limit_cycles import Target as Target
@@ -39,6 +40,7 @@ _PLACES = {
     "McmjError": "utils.errors",
     "Phase": "simulation.phases",
     "RandomForces": "simulation.phases",
+    "Reservoir": "simulation.reservoir",
     "Schedule": "simulation.phases",
     "Simulation": "simulation.simulation",
     "SpringLaw": "core.callbacks.spring_laws",

@@ -55,9 +55,11 @@ MUJOCO = {
     "robots.trunk_walker",
     "robots.walk_scene",
     "robots.walker",
+    "simulation.adopted_model",
     "simulation.damage",
     "simulation.interactive",
     "simulation.mujoco_engine",
+    "simulation.reservoir",
     "simulation.simulation",
     "utils.quiet",
 }

@@ -8,8 +8,10 @@ import numpy as np
 from mcmj.utils.errors import UnknownNameError
 from mcmj.utils.validation import Array
 
-TIME_AXIS = {"lengths": -2, "outputs": -2, "positions": -3, "velocities": -3}
-RECORDABLE = tuple(TIME_AXIS)
+TIME_AXIS = {
+    "lengths": -2, "outputs": -2, "positions": -3, "velocities": -3, "qpos": -2, "qvel": -2,
+}  # fmt: skip
+RECORDABLE = ("lengths", "outputs", "positions", "velocities")  # of a body
 
 
 @dataclass(frozen=True)
@@ -44,9 +46,10 @@ class Trajectory:
 
     Attributes:
         times: (T,) [s].
-        lengths: (T, L) spring lengths [m].
+        lengths: (T, L) spring lengths [m]; of any other model the signals (T, n_signals).
         outputs: (T, n_outputs), zeros without a readout.
         positions, velocities: (T, N, 2) [m], [m/s].
+        qpos, qvel: (T, nq), (T, nv) of a model that is no Body.
         final_state: state after the last step.
     """
 
@@ -55,10 +58,17 @@ class Trajectory:
     outputs: Array | None = None
     positions: Array | None = None
     velocities: Array | None = None
+    qpos: Array | None = None
+    qvel: Array | None = None
     final_state: State | None = field(default=None, repr=False)
 
     def __len__(self) -> int:
         return len(self.times)
+
+    @property
+    def signals(self) -> Array | None:
+        """What the readout hears: (T, n_signals), the lengths of a body."""
+        return self.lengths
 
     def get(self, name: str) -> Array:
         """A recorded array.
@@ -66,9 +76,9 @@ class Trajectory:
         Raises:
             UnknownNameError: it was not recorded.
         """
-        array = getattr(self, name) if name in RECORDABLE else None
+        array = getattr(self, name) if name in TIME_AXIS else None
         if array is None:
-            recorded = [n for n in RECORDABLE if getattr(self, n) is not None]
+            recorded = [n for n in TIME_AXIS if getattr(self, n) is not None]
             raise UnknownNameError("recorded array", name, recorded)
         return array
 
@@ -85,5 +95,5 @@ def join(parts: Sequence[Trajectory]) -> Trajectory:
     return Trajectory(
         times=np.concatenate([part.times for part in parts]),
         final_state=parts[-1].final_state,
-        **{name: whole(name) for name in RECORDABLE},
+        **{name: whole(name) for name in TIME_AXIS},
     )

@@ -5,9 +5,9 @@ from copy import copy
 
 import numpy as np
 
-from mcmj.learning.lessons import Lesson, Teaching
+from mcmj.learning.lessons import Lesson, Teachable, Teaching
 from mcmj.learning.regression import Fit, Regression
-from mcmj.simulation.simulation import CHUNK, Simulation
+from mcmj.simulation.simulation import CHUNK
 from mcmj.targets.limit_cycles import Target
 from mcmj.utils.errors import InvalidArgumentError
 from mcmj.utils.progress import OnSteps
@@ -16,20 +16,20 @@ from mcmj.utils.validation import Array
 
 
 def teach(
-    simulation: Simulation,
+    simulation: Teachable,
     target: Target,
     teaching: Teaching,
     seed: int,
     *,
     on_steps: OnSteps = lambda steps: None,
 ) -> Fit:
-    """Teach a target to a body by teacher forcing, then close the loop with the readout.
+    """Teach a target by teacher forcing, then close the loop with the readout.
 
     The teacher runs on from the simulation's time, so that afterwards the target's value at
     `simulation.time` is still what the body should do. Memory does not grow with duration.
 
     Args:
-        simulation: the body to teach; afterwards its readout is the fitted one.
+        simulation: a body, or any reservoir; afterwards its readout is the fitted one.
         seed: of the noise streams.
         on_steps: called with the number of steps done after every chunk, for progress bars.
 
@@ -42,7 +42,7 @@ def teach(
 
 
 def teach_lessons(
-    simulation: Simulation,
+    simulation: Teachable,
     lessons: Iterable[Lesson],
     teaching: Teaching,
     seed: int,
@@ -81,7 +81,7 @@ class Course:
         seed: of the noise streams.
     """
 
-    def __init__(self, simulation: Simulation, teaching: Teaching, seed: int) -> None:
+    def __init__(self, simulation: Teachable, teaching: Teaching, seed: int) -> None:
         self.simulation, self._teaching = simulation, teaching
         self._regression = Regression(bias=teaching.bias)
         self._noise = stream(seed, "teacher_noise")
@@ -161,7 +161,7 @@ class Course:
 
 
 def synchronise(
-    simulation: Simulation, target: Target, duration: float, inputs: object = None
+    simulation: Teachable, target: Target, duration: float, inputs: object = None
 ) -> None:
     """Bring a body onto the target by clean teacher forcing, without learning.
 

@@ -33,6 +33,8 @@ STUDY = "from mcmj.search.study import Study; Study('s', {}, {'x': 1}, 0, startu
     ],
 )
 def test_a_missing_extra_gives_the_install_command(package, extra, use):
+    if extra in ("control", "gym"):  # packages that hide each other
+        pytest.importorskip("dm_control")
     code = USE.format(package=package, use=use)
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
     assert not done.stderr

@@ -22,6 +22,7 @@ from numba import types
 from mcmj.core.callbacks.offsets import word_offsets
 from mcmj.core.callbacks.passive import compile_passive
 from mcmj.core.callbacks.pointers import TAG, WORDS, CFunction, doubles
+from mcmj.core.callbacks.reservoir_law import compile_control
 from mcmj.utils.errors import McmjError
 
 N_BIAS_PARAMETERS = 10  # mjNBIAS
@@ -94,6 +95,16 @@ class _Callback:
 
 _READOUT = _Callback("mjcb_act_bias", _compile_readout)
 _PASSIVE = _Callback("mjcb_passive", compile_passive)
+_CONTROL = _Callback("mjcb_control", compile_control)
+
+
+def install_control() -> None:
+    """Install the law of reservoirs in any model; idempotent.
+
+    Raises:
+        McmjError: another package's callback of that kind is installed.
+    """
+    _CONTROL.install()
 
 
 def install(*, passive: bool = False) -> None:
@@ -113,4 +124,5 @@ def install(*, passive: bool = False) -> None:
 def uninstall() -> None:
     """Take our callbacks out of MuJoCo; others' stay. Loops are then open, integrators MuJoCo's."""
     _READOUT.uninstall()
+    _CONTROL.uninstall()
     _PASSIVE.uninstall()

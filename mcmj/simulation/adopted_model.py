@@ -1,0 +1,313 @@
+"""Any MuJoCo model as a reservoir: its sensors are found by name, and the channels are added.
+
+MjSpec keeps what the model is; what is added holds no force and changes no motion: actuators of
+gain 0 (a channel each, see `mcmj.core.callbacks.reservoir_law`), sensors, one custom numeric.
+"""
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from fnmatch import fnmatchcase
+from os import PathLike
+from pathlib import Path
+from typing import Any, TypeAlias
+
+import mujoco
+import numpy as np
+import numpy.typing as npt
+
+from mcmj.core.callbacks.reservoir_law import NUMERIC, block
+from mcmj.core.integrators import integrator_named
+from mcmj.utils.errors import BodyFileError, InvalidArgumentError, UnknownNameError
+from mcmj.utils.quiet import quiet_warnings
+from mcmj.utils.validation import Array, require_count, require_number
+
+Model: TypeAlias = str | PathLike[str] | mujoco.MjSpec
+Channels: TypeAlias = Sequence[str] | Mapping[str, Mapping[str, float]]
+
+# what can be asked for that the model has no sensor of: MJCF's sensor, and its object
+ADDABLE = {
+    "jointpos": ("joint", mujoco.mjtObj.mjOBJ_JOINT),
+    "jointvel": ("joint", mujoco.mjtObj.mjOBJ_JOINT),
+    "tendonpos": ("tendon", mujoco.mjtObj.mjOBJ_TENDON),
+    "tendonvel": ("tendon", mujoco.mjtObj.mjOBJ_TENDON),
+    "actuatorpos": ("actuator", mujoco.mjtObj.mjOBJ_ACTUATOR),
+    "actuatorvel": ("actuator", mujoco.mjtObj.mjOBJ_ACTUATOR),
+    "actuatorfrc": ("actuator", mujoco.mjtObj.mjOBJ_ACTUATOR),
+}
+SETTINGS = "mcmj_reservoir_settings"  # custom text, exact: sensors, channels, inputs, readout
+OURS = "mcmj:"  # begins the names of what is added
+_COPIED = (
+    "type",
+    "objtype",
+    "objname",
+    "reftype",
+    "refname",
+    "intprm",
+    "dim",
+    "datatype",
+    "cutoff",
+)
+
+
+@dataclass(frozen=True)
+class AdoptedModel:
+    """A compiled model with its channels.
+
+    Attributes:
+        spec, model: the model with what was added, to be written and to be stepped.
+        signals: (n_signals,) where they stand in sensordata, never delayed.
+        late: (n_signals,) bool: MuJoCo computes it after actuation, so the law hears the value
+            of the step before.
+        signal_names, channel_names, input_names: of signals (component by component), outputs
+            and inputs.
+        first: actuator of the first channel; outputs, then inputs.
+        memory: in userdata, where late signals are put back from.
+    """
+
+    spec: mujoco.MjSpec
+    model: mujoco.MjModel
+    signals: npt.NDArray[np.int64]
+    late: npt.NDArray[np.bool_]
+    signal_names: tuple[str, ...]
+    channel_names: tuple[str, ...]
+    input_names: tuple[str, ...]
+    first: int
+    memory: int
+
+
+def adopt(
+    model: Model,
+    sensors: str | Sequence[str],
+    channels: Channels,
+    inputs: Channels = (),
+    *,
+    timestep: float | None = None,
+    integrator: str | None = None,
+    feedback_delay: int = 0,
+) -> AdoptedModel:
+    """A model with the channels of a reservoir; the arguments are those of Reservoir.
+
+    Raises:
+        BodyFileError: no such file, or not a model.
+        InvalidArgumentError, UnknownNameError: an argument out of bounds, or a name or pattern
+            that the model does not have.
+    """
+    spec = _spec(model)
+    require_count("feedback_delay", feedback_delay, 0)
+    if timestep is not None:
+        require_number("timestep", timestep, 0.0, open_low=True)
+        spec.option.timestep = timestep
+    if integrator is not None:
+        name = integrator_named(integrator).mujoco_name
+        spec.option.integrator = getattr(mujoco.mjtIntegrator, f"mjINT_{name.upper()}")
+    heard = _resolved_sensors(spec, sensors)
+    drives: list[list[dict[str, float]]] = []
+    names: list[tuple[str, ...]] = []
+    for kind, given in (("channel", channels), ("input", inputs)):
+        found = _resolved_channels(spec, kind, given)
+        names.append(tuple(found))
+        drives.append(list(found.values()))
+    if not names[0]:
+        raise InvalidArgumentError("channels", "at least one actuator", channels)
+    adopted = _with_channels(spec, heard, names, [*drives[0], *drives[1]], feedback_delay)
+    gains = [dict(zip(names[kind], drives[kind], strict=True)) for kind in range(2)]
+    account = {"sensors": heard, "channels": gains[0], "inputs": gains[1], "delay": feedback_delay}
+    adopted.spec.add_text(name=SETTINGS, data=json.dumps(account))
+    return adopted
+
+
+def stored(model: Model) -> tuple[mujoco.MjSpec, dict[str, Any], Array | None]:
+    """What a file of a trained reservoir holds.
+
+    Returns:
+        the model as it was before it was adopted, the arguments of `adopt`, and the readout
+        (n_signals + 1, n_channels), or None.
+
+    Raises:
+        BodyFileError: no such file, not a model, or not that of a reservoir.
+    """
+    spec = _spec(model)
+    texts = {text.name: text for text in spec.texts}
+    numbers = {numeric.name: numeric for numeric in spec.numerics}
+    try:
+        account = json.loads(texts[SETTINGS].data)
+        given = {
+            "sensors": list(account["sensors"]),
+            "channels": dict(account["channels"]),
+            "inputs": dict(account["inputs"]),
+            "feedback_delay": account["delay"],
+        }
+        kept = account["w_out"]
+        w_out = None if kept is None else np.array(kept, np.float64)
+        law = numbers[NUMERIC]
+    except (KeyError, ValueError, TypeError, AttributeError) as error:
+        raise BodyFileError(f"model: not the file of a reservoir ({error})") from error
+    added = [one for one in (*spec.actuators, *spec.sensors) if one.name.startswith(OURS)]
+    for element in (*added, texts[SETTINGS], law):
+        spec.delete(element)
+    return spec, given, w_out
+
+
+def _spec(model: Model) -> mujoco.MjSpec:
+    """A copy of the model as MjSpec."""
+    if isinstance(model, mujoco.MjSpec):
+        return model.copy()
+    if isinstance(model, mujoco.MjModel):
+        raise InvalidArgumentError(
+            "model", "MJCF (a path or a string) or an MjSpec: a compiled model takes no channels",
+            "an MjModel",
+        )  # fmt: skip
+    try:
+        with quiet_warnings():
+            if isinstance(model, str) and model.lstrip().startswith("<"):
+                return mujoco.MjSpec.from_string(model)
+            return mujoco.MjSpec.from_file(str(Path(model)))
+    except (ValueError, OSError, TypeError) as error:
+        raise BodyFileError(f"model: {' '.join(str(error).split())}") from error
+
+
+def _resolved_sensors(spec: mujoco.MjSpec, sensors: str | Sequence[str]) -> list[str]:
+    """Names of sensors of the spec, in order; those asked for as kind:object are added."""
+    found: list[str] = []
+    for pattern in [sensors] if isinstance(sensors, str) else sensors:
+        kind, colon, objects = pattern.partition(":")
+        if colon and kind in ADDABLE:
+            matches = [_added(spec, kind, name) for name in _objects(spec, kind, objects)]
+        else:
+            known = [sensor.name for sensor in spec.sensors if sensor.name]
+            matches = [name for name in known if fnmatchcase(name, pattern)]
+            if not matches:
+                raise UnknownNameError("sensor", pattern, [*known, *(f"{k}:*" for k in ADDABLE)])
+        found += [name for name in matches if name not in found]
+    if not found:
+        raise InvalidArgumentError("sensors", "at least one sensor", sensors)
+    return found
+
+
+def _objects(spec: mujoco.MjSpec, kind: str, pattern: str) -> list[str]:
+    """Names of the joints, tendons or actuators that a pattern matches."""
+    what, _ = ADDABLE[kind]
+    known = [one.name for one in getattr(spec, f"{what}s") if one.name]
+    if what == "joint":
+        scalar = (mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_SLIDE)
+        known = [joint.name for joint in spec.joints if joint.name and joint.type in scalar]
+    matches = [name for name in known if fnmatchcase(name, pattern)]
+    if not matches:
+        raise UnknownNameError(f"{what} (of sensor {kind})", pattern, known)
+    return matches
+
+
+def _added(spec: mujoco.MjSpec, kind: str, name: str) -> str:
+    """Name of a sensor of that kind of that object, added if there is none."""
+    full = f"{kind}:{name}"
+    if full not in [sensor.name for sensor in spec.sensors]:
+        what = getattr(mujoco.mjtSensor, f"mjSENS_{kind.upper()}")
+        spec.add_sensor(name=full, type=what, objtype=ADDABLE[kind][1], objname=name)
+    return full
+
+
+def _resolved_channels(
+    spec: mujoco.MjSpec, kind: str, given: Channels
+) -> dict[str, dict[str, float]]:
+    """The gain of each actuator, by channel."""
+    known = [actuator.name for actuator in spec.actuators if actuator.name]
+    if isinstance(given, Mapping):
+        for name, gains in given.items():
+            for actuator, gain in gains.items():
+                if actuator not in known:
+                    raise UnknownNameError(f"actuator of {kind} {name}", actuator, known)
+                require_number(f"gain of {actuator}", gain, -np.inf)
+        return {name: dict(gains) for name, gains in given.items()}
+    found: dict[str, dict[str, float]] = {}
+    for pattern in [given] if isinstance(given, str) else given:
+        matches = [name for name in known if fnmatchcase(name, pattern)]
+        if not matches:
+            raise UnknownNameError(f"actuator of {kind}s", pattern, known)
+        found |= {name: {name: 1.0} for name in matches}
+    return found
+
+
+def _with_channels(
+    spec: mujoco.MjSpec,
+    heard: list[str],
+    names: list[tuple[str, ...]],
+    drives: list[dict[str, float]],
+    feedback_delay: int,
+) -> AdoptedModel:
+    if NUMERIC in [numeric.name for numeric in spec.numerics]:
+        raise InvalidArgumentError("model", "one that is not a reservoir yet", NUMERIC)
+    spec.add_sensor(name=f"{OURS}time", type=mujoco.mjtSensor.mjSENS_CLOCK)
+    bare = _compiled(spec)
+    actuators = {bare.actuator(a).name: a for a in range(bare.nu)}
+    law_reads = heard if feedback_delay == 0 else _delayed(spec, heard, feedback_delay)
+    signals, signal_names, late = _addresses(_compiled(spec), heard)
+    read = _addresses(_compiled(spec), law_reads)[0].tolist()
+    numbers = block(
+        read,
+        [place for place, slow in zip(read, late, strict=True) if slow],
+        [
+            (actuators[name], channel, gain)
+            for channel, gains in enumerate(drives)
+            for name, gain in gains.items()
+        ],
+        outputs=len(names[0]),
+        first=bare.nu,
+        clock=int(bare.sensor(f"{OURS}time").adr[0]),
+        memory=bare.nuserdata,
+        delay=max(0.0, feedback_delay - 0.5) * spec.option.timestep,
+    )
+    spec.nuserdata = bare.nuserdata + (1 + int(late.sum()) if late.any() else 0)
+    spec.nuser_actuator = max(bare.nuser_actuator, len(signals) + 1)
+    for kind, name in [*(("output", n) for n in names[0]), *(("input", n) for n in names[1])]:
+        _add_channel(spec, f"{OURS}{kind}:{name}", len(signals) + 1)
+    spec.add_numeric(name=NUMERIC, data=numbers, size=len(numbers))
+    return AdoptedModel(
+        spec, _compiled(spec), signals, late, signal_names, names[0], names[1], bare.nu,
+        bare.nuserdata,
+    )  # fmt: skip
+
+
+def _add_channel(spec: mujoco.MjSpec, name: str, width: int) -> None:
+    """An actuator without force, on what the first actuator moves."""
+    like = spec.actuators[0]
+    spec.add_actuator(
+        name=name, trntype=like.trntype, target=like.target, refsite=like.refsite,
+        slidersite=like.slidersite, cranklength=like.cranklength,
+        gainprm=np.zeros(10), biastype=mujoco.mjtBias.mjBIAS_NONE, userdata=np.zeros(width),
+    )  # fmt: skip
+
+
+def _delayed(spec: mujoco.MjSpec, heard: list[str], steps: int) -> list[str]:
+    """Names of copies of sensors that show what was so many steps ago."""
+    step, names = spec.option.timestep, []
+    for name in heard:
+        sensor = spec.sensor(name)
+        values: dict[str, Any] = {field: getattr(sensor, field) for field in _COPIED}
+        names.append(f"{OURS}late:{name}")
+        spec.add_sensor(name=names[-1], delay=(steps - 0.5) * step, nsample=steps + 1, **values)
+    return names
+
+
+def _addresses(
+    model: mujoco.MjModel, names: list[str]
+) -> tuple[npt.NDArray[np.int64], tuple[str, ...], npt.NDArray[np.bool_]]:
+    """Places in sensordata of all components, their names, and whether they are late."""
+    places: list[int] = []
+    labels: list[str] = []
+    late: list[bool] = []
+    for name in names:
+        sensor = model.sensor(name)
+        first, width = int(sensor.adr[0]), int(sensor.dim[0])
+        places += range(first, first + width)
+        labels += [name] if width == 1 else [f"{name}[{i}]" for i in range(width)]
+        late += [sensor.needstage[0] == mujoco.mjtStage.mjSTAGE_ACC] * width
+    return np.array(places), tuple(labels), np.array(late)
+
+
+def _compiled(spec: mujoco.MjSpec) -> mujoco.MjModel:
+    try:
+        with quiet_warnings():
+            return spec.compile()
+    except (ValueError, mujoco.FatalError) as error:
+        raise BodyFileError(f"model: {' '.join(str(error).split())}") from error

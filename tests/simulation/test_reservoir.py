@@ -1,0 +1,259 @@
+"""Any model as a reservoir: signals, outputs and controls agree with a plain Python loop."""
+
+import subprocess
+import sys
+
+import mujoco
+import numpy as np
+import pytest
+
+import mcmj
+from mcmj import Reservoir
+from mcmj.metrics.orbits import orbit_error
+from mcmj.utils.errors import BodyFileError, InvalidArgumentError, UnknownNameError
+
+ARM = """
+<mujoco><option timestep="0.002" gravity="0 0 -9.81"/>
+<worldbody><geom type="plane" size="5 5 .1"/>
+  <body name="a" pos="0 0 1"><joint name="j1" axis="0 1 0" damping="2" stiffness="20"/>
+    <geom type="capsule" fromto="0 0 0 .4 0 0" size=".04"/><site name="tip_a" pos=".4 0 0"/>
+    <body name="b" pos=".4 0 0"><joint name="j2" axis="0 1 0" damping="1" stiffness="10"/>
+      <joint name="j3" axis="0 0 1" damping="1" stiffness="10"/>
+      <geom type="capsule" fromto="0 0 0 .3 0 0" size=".03"/><site name="tip" pos=".3 0 0"/>
+    </body></body></worldbody>
+<tendon><spatial name="t"><site site="tip_a"/><site site="tip"/></spatial></tendon>
+<actuator>
+  <motor name="m1" joint="j1" gear="3" ctrlrange="-2 2" ctrllimited="true"/>
+  <position name="p2" joint="j2" kp="8" forcerange="-3 3" forcelimited="true"/>
+  <general name="f3" joint="j3" dyntype="filter" dynprm=".05" gainprm="2"/>
+  <motor name="free" joint="j3"/>
+  <intvelocity name="iv" joint="j1" kp="2" actrange="-1 1"/>
+  <damper name="d" joint="j2" ctrlrange="0 2" kv="1"/>
+</actuator>
+<sensor><jointpos name="q1" joint="j1"/><framepos name="tip" objtype="site" objname="tip"/>
+  <accelerometer name="acc" site="tip"/><jointvel name="v2" joint="j2"/>
+  <actuatorfrc name="frc" actuator="p2"/></sensor>
+</mujoco>"""
+SENSORS = ["q1", "tip", "acc", "v*", "frc", "jointpos:j3", "tendonpos:t"]
+CHANNELS = {"y": {"m1": 1.5, "p2": -0.5}, "z": {"f3": 1.0, "iv": 0.3}, "w": {"d": 1.0}}
+INTEGRATORS = ["Euler", "RK4", "implicit", "implicitfast"]
+T = 3000
+COMPILED = mujoco.MjModel.from_xml_string(ARM)
+
+
+def python_loop(reservoir, w_out, gate, offset, inputs):
+    """The law by hand, on the reservoir's own model without our callback."""
+    model = mujoco.MjModel.from_xml_string(ARM.replace("<sensor>", "<sensor>"))
+    model.opt.integrator, model.opt.timestep = (
+        reservoir.model.opt.integrator,
+        reservoir.model.opt.timestep,
+    )
+    data = mujoco.MjData(model)
+    late = np.zeros(4)
+    signals, outputs, controls = [], [], []
+    joint, tendon = model.joint("j3").qposadr[0], 0
+    for k in range(len(offset)):
+        mujoco.mj_fwdPosition(model, data)
+        mujoco.mj_sensorPos(model, data)
+        mujoco.mj_fwdVelocity(model, data)
+        mujoco.mj_sensorVel(model, data)
+        s = np.r_[
+            data.sensor("q1").data, data.sensor("tip").data, late[:3], data.sensor("v2").data,
+            late[3], data.qpos[joint], data.ten_length[tendon],
+        ]  # fmt: skip
+        y = s @ w_out[:-1] + w_out[-1]
+        drive = gate * y + offset[k]
+        data.ctrl[:] = 0.0
+        for value, gains in zip(drive, CHANNELS.values(), strict=True):
+            for name, gain in gains.items():
+                data.ctrl[model.actuator(name).id] += gain * value
+        data.ctrl[model.actuator("free").id] += inputs[k, 0]
+        signals.append(s)
+        outputs.append(y)
+        controls.append(data.ctrl.copy())
+        if model.opt.integrator == mujoco.mjtIntegrator.mjINT_RK4:
+            mujoco.mj_forward(model, data)
+            late = np.r_[data.sensor("acc").data, data.sensor("frc").data].copy()
+            mujoco.mj_step(model, data)
+        else:
+            mujoco.mj_step(model, data)
+            late = np.r_[data.sensor("acc").data, data.sensor("frc").data].copy()
+    return np.array(signals), np.array(outputs), np.array(controls), data.qpos.copy()
+
+
+def driven(integrator):
+    reservoir = Reservoir(
+        ARM, sensors=SENSORS, channels=CHANNELS, inputs=["free"], integrator=integrator
+    )
+    rng = np.random.default_rng(0)
+    w_out = 0.02 * rng.normal(size=(reservoir.n_signals + 1, 3))
+    offset = np.cumsum(rng.normal(size=(T, 3)), axis=0) / np.sqrt(T)
+    inputs = np.sin(0.01 * np.arange(T))[:, None]
+    return reservoir, w_out, np.array([1.0, 0.5, 0.7]), offset, inputs
+
+
+@pytest.mark.parametrize("integrator", INTEGRATORS)
+def test_signals_and_outputs_agree_with_a_plain_loop(integrator):
+    reservoir, w_out, gate, offset, inputs = driven(integrator)
+    assert reservoir.signal_names[1:4] == ("tip[0]", "tip[1]", "tip[2]")
+    reservoir.set_readout(w_out)
+    run = reservoir.rollout(inputs=inputs, offset=offset, gate=gate, record=("signals", "outputs"))
+    signals, outputs, _, _ = python_loop(reservoir, w_out, gate, offset, inputs)
+    assert np.abs(run.signals - signals).max() < 1e-12 * np.abs(signals).max()
+    assert np.abs(run.outputs - outputs).max() < 1e-12 * np.abs(outputs).max()
+
+
+def test_chunks_snapshots_and_a_second_run_are_the_same_bits():
+    reservoir, w_out, gate, offset, inputs = driven("implicitfast")
+    reservoir.set_readout(w_out)
+    whole = reservoir.rollout(inputs=inputs, offset=offset, gate=gate, record=("signals", "qpos"))
+    reservoir.reset()
+    parts = list(reservoir.stream(inputs=inputs, offset=offset, gate=gate, chunk=700))
+    assert np.array_equal(np.concatenate([part.signals for part in parts]), whole.signals)
+    reservoir.reset()
+    reservoir.rollout(inputs=inputs[:1000], offset=offset[:1000], gate=gate)
+    snapshot = reservoir.snapshot()
+    reservoir.rollout(500)
+    reservoir.restore(snapshot)
+    rest = reservoir.rollout(inputs=inputs[1000:], offset=offset[1000:], gate=gate)
+    assert np.array_equal(rest.signals, whole.signals[1000:])
+    assert reservoir.time == pytest.approx(T * 0.002)
+    with pytest.raises(InvalidArgumentError, match="snapshot: expected one of this model"):
+        Reservoir(ARM, sensors="q1", channels=["m1"]).restore(snapshot)
+
+
+def test_a_delay_feeds_back_what_was():
+    late = Reservoir(ARM, sensors=["q1", "jointvel:j1"], channels=["m1"], feedback_delay=3)
+    w_out = np.array([[-0.5], [-0.1], [0.3]])
+    late.set_readout(w_out)
+    offset = np.ones((200, 1))
+    run = late.rollout(offset=offset)
+    model = mujoco.MjModel.from_xml_string(ARM)
+    data = mujoco.MjData(model)
+    seen = []
+    for k in range(200):
+        mujoco.mj_fwdPosition(model, data)
+        mujoco.mj_fwdVelocity(model, data)
+        seen.append([data.qpos[0], data.qvel[0]])
+        y = (np.array(seen[k - 3]) @ w_out[:2] + w_out[2])[0] if k >= 3 else 0.0
+        data.ctrl[model.actuator("m1").id] = y + 1.0
+        mujoco.mj_step(model, data)
+    assert np.abs(run.signals - seen).max() < 1e-12
+
+
+def test_a_body_is_the_same_as_a_reservoir_and_as_a_simulation(body, w_bias):
+    simulation = mcmj.Simulation(body, w_out=w_bias)
+    channels = [f"y{c}" for c in range(body.n_outputs)]
+    xml = mcmj.to_mjcf(body)
+    names = [a.name for a in mujoco.MjSpec.from_string(xml).actuators][body.n_inputs :]
+    spec = mujoco.MjSpec.from_string(xml)
+    for name in names:  # its own law is taken out
+        spec.actuator(name).biastype = mujoco.mjtBias.mjBIAS_NONE
+    reservoir = Reservoir(
+        spec, sensors="*",
+        channels={c: {n: 1.0} for c, n in zip(channels, names, strict=True)}, w_out=w_bias,
+    )  # fmt: skip
+    one, other = simulation.rollout(2000), reservoir.rollout(2000)
+    assert np.abs(one.lengths - other.signals).max() < 1e-9
+
+
+@pytest.mark.parametrize(
+    ("changes", "error", "text"),
+    [
+        ({"model": "nowhere.xml"}, BodyFileError, "model: "),
+        ({"model": "<mujoco><nix/></mujoco>"}, BodyFileError, "model: "),
+        (
+            {"model": mujoco.MjModel.from_xml_string(ARM)},
+            InvalidArgumentError,
+            "model: expected MJ",
+        ),
+        ({"sensors": "nix*"}, UnknownNameError, r"unknown sensor 'nix\*'; valid choices: acc"),
+        ({"sensors": "jointpos:no"}, UnknownNameError, "unknown joint"),
+        ({"sensors": ()}, InvalidArgumentError, "sensors: expected at least one sensor"),
+        ({"channels": ["no"]}, UnknownNameError, "unknown actuator of channels 'no'"),
+        ({"channels": {"y": {"no": 1.0}}}, UnknownNameError, "unknown actuator of channel y"),
+        ({"channels": {}}, InvalidArgumentError, "channels: expected at least one"),
+        ({"timestep": -1.0}, InvalidArgumentError, "timestep: "),
+        ({"integrator": "Verlet"}, UnknownNameError, "unknown integrator 'Verlet'"),
+        ({"w_out": np.zeros((2, 2))}, InvalidArgumentError, "w_out: "),
+    ],
+)
+def test_what_a_model_has_not_is_named(changes, error, text):
+    given = {"model": ARM, "sensors": "q1", "channels": ["m1"]} | changes
+    with pytest.raises(error, match=text):
+        Reservoir(given.pop("model"), **given)
+
+
+def test_a_run_that_blows_up_names_the_joint():
+    reservoir = Reservoir(ARM, sensors="jointvel:*", channels=["free"], w_out=np.full((3, 1), 1e6))
+    with pytest.raises(mcmj.utils.errors.DivergenceError, match=r"blew up after t = .* at joint"):
+        reservoir.rollout(20_000, offset=np.ones((20_000, 1)))
+
+
+def test_a_file_is_complete(tmp_path):
+    reservoir, w_out, _, offset, inputs = driven("RK4")
+    reservoir.set_readout(w_out)
+    (tmp_path / "arm.xml").write_text(reservoir.to_mjcf())
+    again = Reservoir.open(tmp_path / "arm.xml")
+    assert again.channel_names == reservoir.channel_names
+    assert np.array_equal(again.w_out, w_out)
+    one, other = (r.rollout(inputs=inputs[:300], offset=offset[:300]) for r in (reservoir, again))
+    assert np.abs(one.signals - other.signals).max() < 1e-9
+    with pytest.raises(BodyFileError, match="not the file of a reservoir"):
+        Reservoir.open(ARM)
+
+
+def test_a_chain_of_masses_learns_a_rhythm_through_its_own_sensors_and_motors():
+    links = 12
+    body = "<body pos='.1 0 0'><joint name='j{0}' axis='0 0 1' damping='.02' stiffness='{1}'/>"
+    body += "<geom type='capsule' fromto='0 0 0 .1 0 0' size='.02' mass='.1'/>"
+    rng = np.random.default_rng(0)
+    chain = "".join(body.format(i, rng.uniform(0.5, 4.0)) for i in range(links))
+    motors = "".join(f"<motor name='m{i}' joint='j{i}'/>" for i in range(links))
+    xml = (
+        "<mujoco><option timestep='.002' gravity='0 0 0' integrator='implicitfast'/><worldbody>"
+        f"{chain}{'</body>' * links}</worldbody><actuator>{motors}</actuator></mujoco>"
+    )
+    channels = {
+        name: {f"m{i}": 0.3 * rng.uniform(-1, 1) for i in range(links)} for name in ("x1", "x2")
+    }
+    reservoir = Reservoir(xml, sensors=["jointpos:*", "jointvel:*"], channels=channels)
+    goal = mcmj.target("van_der_pol")
+    teaching = mcmj.Teaching(duration=60.0, noise=0.2, bias=True, ridge_per_row=1e-10)
+    fit = mcmj.teach(reservoir, goal, teaching, seed=0)
+    assert fit.train_nrmse < 0.05
+    outputs = reservoir.rollout(20_000, record=("outputs",)).outputs
+    assert orbit_error(outputs[-7000:], goal) < 0.05
+
+
+HOSTILE = """
+import mujoco, numpy as np
+from mcmj.core.callbacks import install
+from mcmj.core.callbacks.reservoir_law import RESERVOIR_TAG, block
+install.install_control()
+rng = np.random.default_rng(0)
+good = block([0, 1], [1], [(0, 0, 1.0)], outputs=1, first=1, clock=2, delay=0.0, memory=0)
+bad = [np.nan, np.inf, -1.0, 0.5, 1e9, 1e300, -1e300, 2.0**63, 3.0, 0.0]
+for case in range(400):
+    values = list(good)
+    for place in rng.integers(1, len(good), size=rng.integers(1, 4)):
+        values[place] = bad[rng.integers(len(bad))]
+    if case % 5 == 0:
+        values = values[: rng.integers(1, len(good))]
+    spec = mujoco.MjSpec.from_string(
+        "<mujoco><worldbody><body><joint name='j'/><geom size='.1'/></body></worldbody>"
+        "<actuator><motor joint='j'/><motor joint='j'/></actuator>"
+        "<sensor><jointpos joint='j'/><jointvel joint='j'/><clock/></sensor></mujoco>"
+    )
+    spec.nuser_actuator, spec.nuserdata = 3, case % 4
+    numeric = spec.add_numeric(name="n", data=[0.0] * len(values), size=len(values))
+    model = spec.compile()
+    model.numeric_data[:] = values  # also what MuJoCo's compiler would refuse
+    mujoco.mj_step(model, mujoco.MjData(model), 3)
+print("alive")
+"""
+
+
+def test_a_hostile_model_cannot_harm():
+    done = subprocess.run([sys.executable, "-c", HOSTILE], capture_output=True, text=True)
+    assert done.stdout == "alive\n", done.stderr
