@@ -18,15 +18,18 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from mcmj.reference.twin.leapfrog import advance_leapfrog
-from mcmj.reference.twin.rows import copy, load_history, load_rows, store_history, store_rows
+from mcmj.reference.twin.leapfrog import advance_leapfrog, prepare_leapfrog
+from mcmj.reference.twin.rows import load_body, store_body
 from mcmj.reference.twin.stepping import (
     COMPILE,
+    INLINE,
     LEAPFROG,
     RK4,
+    at_step,
     begin_rk4,
     held_step,
-    method_constants,
+    load_law,
+    new_work,
     rk4_weights,
     spring_force,
     transpose,
@@ -63,43 +66,49 @@ class Bodies(NamedTuple):
 
 
 @njit(**COMPILE)
-def find_pulls(ends, rows, laws, lengths, pulls, blocks, toolbox, per_step):
+def body_of(bodies, b):
+    """Body b: the same fields without the leading axis."""
+    return Bodies(
+        bodies.nodes[b],
+        bodies.springs[b],
+        bodies.ends[b],
+        bodies.turns[b],
+        bodies.laws[b],
+        bodies.mobility[b],
+        bodies.channels[b],
+        bodies.w_out[b],
+        bodies.bias[b],
+    )
+
+
+@njit(**INLINE)
+def find_pulls(body, work, pulls, scheme):
     """Replace each spring's length; pulls = force on its tail, springs 0 2 1 3 in a block."""
-    for block in range(blocks):
-        e, law = 8 * block, 20 * block
-        x, y, u, v = transpose(
+    ends, rows, lengths = body.ends, work.rows, work.lengths
+    for block in range(pulls.size // 8):
+        e = 8 * block
+        gap = transpose(
             load4(rows, ends[e + 4]) - load4(rows, ends[e]),
             load4(rows, ends[e + 5]) - load4(rows, ends[e + 1]),
             load4(rows, ends[e + 6]) - load4(rows, ends[e + 2]),
             load4(rows, ends[e + 7]) - load4(rows, ends[e + 3]),
         )
-        length, f_x, f_y = spring_force(
-            x,
-            y,
-            u,
-            v,
-            load4(lengths, 4 * block),
-            load4(laws, law),
-            load4(laws, law + 4),
-            load4(laws, law + 8),
-            load4(laws, law + 12),
-            load4(laws, law + 16),
-            toolbox,
-            splat4(per_step),
-        )
+        law, before = load_law(body.laws, 20 * block), load4(lengths, 4 * block)
+        length, f_x, f_y = spring_force(gap, law, before, scheme)
         store(lengths, 4 * block, length)
         store(pulls, e, unpack_low(f_x, f_y))
         store(pulls, e + 4, unpack_high(f_x, f_y))
 
 
-@njit(**COMPILE)
-def sum_forces(turns, pulls, force, springs):
+@njit(**INLINE)
+def sum_forces(body, pulls, work):
     """Add each spring's force to its ends.
 
     Springs are visited so that neighbours in the list share no node: each addition would
     otherwise wait for the one before it.
     """
-    for turn in range(springs):
+    turns, force = body.turns, work.force
+    for turn in range(body.springs):
         tail, head = turns[3 * turn + 1], turns[3 * turn + 2]
         pull = load2(pulls, turns[3 * turn])
         on_tail, on_head = load2(force, tail) + pull, load2(force, head) - pull
@@ -107,33 +116,57 @@ def sum_forces(turns, pulls, force, springs):
         store(force, head, on_head)
 
 
-@njit(**COMPILE)
-def find_push(channels, values, room, forces, k, push, nodes):
+@njit(**INLINE)
+def find_values(body, work, schedule, state, record, now):
+    """Outputs of step k, recorded, and the value of every channel."""
+    b, k, toolbox = now
+    offset, gate = schedule.offset, schedule.gate
+    inputs, lengths, values = schedule.inputs, work.lengths, work.values
+    feedback, pairs = values.size - body.bias.size, (body.springs + 7) // 8
+    for c in range(inputs.shape[2]):
+        values[c] = at_step(inputs, b, k, c)
+    for c in range(body.bias.size):
+        sums = weighted_sum(body.w_out, c * lengths.size, lengths, pairs)
+        output = (lane(sums, 0) + lane(sums, 1)) + (lane(sums, 2) + lane(sums, 3)) + body.bias[c]
+        fed_back = state.outputs[b, c] if toolbox else output
+        value = gate[min(b, gate.shape[0] - 1), c] * fed_back
+        if offset.shape[2] > 0:
+            value += at_step(offset, b, k, c)
+        values[feedback + c] = value
+        state.outputs[b, c] = output
+        if record.outputs.shape[1] > 0:
+            record.outputs[b, k, c] = output
+
+
+@njit(**INLINE)
+def find_push(body, work, forces, b, k):
     """Force (f_x, 0) on each node at step k from the schedule, inputs and feedback."""
-    zero = splat4(0.0)
-    for i in range(0, nodes, 4):
+    channels, room = body.channels, body.mobility.size
+    push, values, zero = work.push, work.values, splat4(0.0)
+    for i in range(0, body.nodes, 4):
         total = zero
         for c in range(values.size):
             total += splat4(values[c]) * load4(channels, c * room + i)
         store(push, 2 * i, interleave_low(total, zero))
         store(push, 2 * i + 4, interleave_high(total, zero))
-    row = min(k, forces.shape[0] - 1)
-    for i in range(forces.shape[1]):
-        push[2 * i] += forces[row, i]
+    for i in range(forces.shape[2]):
+        push[2 * i] += at_step(forces, b, k, i)
 
 
 @njit(**COMPILE)
-def advance_held(rows, force, push, mobility, step, shift, nodes):
+def advance_held(body, work, scheme):
     """One step with held force: v += h a; p += h v + shift h^2 a (v before the step).
 
     shift 1: semi-implicit Euler; 0: explicit Euler; 1/2: exact for a held force. Clears the
     force. Returns the sum of the new state: finite only while all of it is.
     """
+    rows, force, step, shift = work.rows, work.force, splat2(scheme.step), splat2(scheme.shift)
     total, zero = splat2(0.0), splat2(0.0)
-    for i in range(nodes):
-        change = splat2(step * mobility[i]) * (load2(force, 2 * i) + load2(push, 2 * i))
+    for i in range(rows.size // 4):
+        applied = load2(force, 2 * i) + load2(work.push, 2 * i)
+        change = splat2(scheme.step * body.mobility[i]) * applied
         p, v = load2(rows, 4 * i), load2(rows, 4 * i + 2)
-        p, v = held_step(p, v, change, splat2(step), splat2(shift))
+        p, v = held_step(p, v, change, step, shift)
         store(force, 2 * i, zero)
         store(rows, 4 * i, join(p, v))  # one store: the row is fetched whole, and soon
         total += p + v
@@ -141,15 +174,16 @@ def advance_held(rows, force, push, mobility, step, shift, nodes):
 
 
 @njit(**COMPILE)
-def advance_rk4(stage, rows, start, slope, force, push, mobility, step, nodes):
+def advance_rk4(body, work, step, stage):
     """Stage 0..3 of classical Runge-Kutta: rows become the next stage's state, or the new one.
 
     Clears the force and returns the sum of rows, as advance_held does.
     """
+    rows, start, slope, force = work.rows, work.start, work.slope, work.force
     weight, reach, finish = rk4_weights(stage, step)
     total, zero = splat4(0.0), splat2(0.0)
-    for i in range(nodes):
-        a = splat2(mobility[i]) * (load2(force, 2 * i) + load2(push, 2 * i))
+    for i in range(rows.size // 4):
+        a = splat2(body.mobility[i]) * (load2(force, 2 * i) + load2(work.push, 2 * i))
         rate = join(load2(rows, 4 * i + 2), a)
         sums = load4(slope, 4 * i) + splat4(weight) * rate
         row = load4(start, 4 * i) + splat4(reach) * rate + splat4(finish) * sums
@@ -160,83 +194,52 @@ def advance_rk4(stage, rows, start, slope, force, push, mobility, step, nodes):
     return (lane(total, 0) + lane(total, 1)) + (lane(total, 2) + lane(total, 3))
 
 
-@njit(**COMPILE)
-def shared(values, b):
-    """Body b's part of an array whose first axis may be shared (size 1)."""
-    return values[min(b, values.shape[0] - 1)]
+@njit(**INLINE)
+def advance(body, work, scheme, stage):
+    """One stage of a step; returns the sum of the new state."""
+    if scheme.method == RK4:
+        if stage == 0:
+            begin_rk4(work)
+        return advance_rk4(body, work, scheme.step, stage)
+    if scheme.method == LEAPFROG:
+        return advance_leapfrog(body, work, scheme.step)
+    return advance_held(body, work, scheme)
 
 
 @njit(**COMPILE)
-def integrate_body(b, bodies, schedule, state, record, method, step, steps):
-    """Advance body b in place; returns the steps whose new state is finite (all: no trouble)."""
-    nodes, springs = bodies.nodes[b], bodies.springs[b]
-    blocks, pairs, room = (springs + 3) // 4, (springs + 7) // 8, bodies.mobility.shape[1]
-    ends, turns, laws, w_out = bodies.ends[b], bodies.turns[b], bodies.laws[b], bodies.w_out[b]
-    mobility, channels, bias = bodies.mobility[b], bodies.channels[b], bodies.bias[b]
-    lengths, last = state.lengths[b], state.outputs[b]
-    inputs, offset = shared(schedule.inputs, b), shared(schedule.offset, b)
-    forces, gate = shared(schedule.forces, b), shared(schedule.gate, b)
-    keep_lengths, keep_outputs = record.lengths.shape[1] > 0, record.outputs.shape[1] > 0
-    rows, start, slope = np.zeros(4 * room), np.zeros(4 * room), np.zeros(4 * room)
-    force, push, pulls = np.zeros(2 * room), np.zeros(2 * room), np.zeros(8 * blocks)
-    half, before, older = np.zeros(2 * room), np.zeros(2 * room), np.zeros(2 * room)
-    n_outputs, values = last.size, np.zeros(channels.size // room)
-    feedback = values.size - n_outputs  # first channel of feedback
-    stages, shift, toolbox = method_constants(method)
-    per_step = 1.0 / step
-    share, total = 1.0, 0.0
-
-    load_rows(rows, state.positions[b], state.velocities[b], mobility, 1, 0)
-    if method == LEAPFROG:
-        share = load_history(state.history[b], rows, half, before, 1, 0)
-    done = 0
-    while done < steps:
-        for stage in range(stages):
-            find_pulls(ends, rows, laws, lengths, pulls, blocks, toolbox, per_step)
+def integrate_body(bodies, run, b):
+    """Advance body b in place; done[b] = steps whose new state is finite (all: no trouble)."""
+    body, schedule, scheme, kept = body_of(bodies, b), run.schedule, run.scheme, run.record.lengths
+    channels = body.channels.size // body.mobility.size
+    lengths = run.state.lengths[b]
+    work = new_work(body.nodes, channels, lengths, 1)
+    pulls = np.zeros(8 * ((body.springs + 3) // 4))
+    state, record, forces = run.state, run.record, schedule.forces
+    load_body(run, work, body.mobility, b, 0)
+    k, total = 0, 0.0
+    while k < run.steps:
+        if scheme.method == LEAPFROG:
+            prepare_leapfrog(work, k, run.steps)
+        for stage in range(scheme.stages):
+            find_pulls(body, work, pulls, scheme)
             if stage == 0:  # inputs, outputs and offsets hold for the whole step
-                if keep_lengths:
-                    for j in range(springs):
-                        record.lengths[b, done, j] = lengths[j]
-                for c in range(inputs.shape[1]):
-                    values[c] = inputs[min(done, inputs.shape[0] - 1), c]
-                for c in range(n_outputs):
-                    sums = weighted_sum(w_out, c * lengths.size, lengths, pairs)
-                    output = (lane(sums, 0) + lane(sums, 1)) + (lane(sums, 2) + lane(sums, 3))
-                    output += bias[c]
-                    fed_back = last[c] if toolbox else output
-                    last[c] = output
-                    values[feedback + c] = gate[c] * fed_back
-                    if offset.shape[1] > 0:
-                        values[feedback + c] += offset[min(done, offset.shape[0] - 1), c]
-                    if keep_outputs:
-                        record.outputs[b, done, c] = output
-                find_push(channels, values, room, forces, done, push, nodes)
-            sum_forces(turns, pulls, force, springs)
-            if method == RK4:
-                if stage == 0:
-                    begin_rk4(rows, start, slope)
-                total = advance_rk4(stage, rows, start, slope, force, push, mobility, step, nodes)
-            elif method == LEAPFROG:
-                if done == steps - 1:
-                    copy(before, older)
-                share = 1.0 if done > 0 else share
-                total = advance_leapfrog(
-                    rows, half, force, push, before, mobility, step, share, nodes
-                )
-            else:
-                total = advance_held(rows, force, push, mobility, step, shift, nodes)
+                if kept.shape[1] > 0:
+                    for j in range(body.springs):
+                        kept[b, k, j] = lengths[j]
+                now = b, k, scheme.toolbox
+                find_values(body, work, schedule, state, record, now)
+                find_push(body, work, forces, b, k)
+            sum_forces(body, pulls, work)
+            total = advance(body, work, scheme, stage)
         if not math.isfinite(total):
             break
-        done += 1
-    store_rows(rows, state.positions[b], state.velocities[b], 1, 0)
-    if method == LEAPFROG and steps > 0:
-        pushes = before, older
-        store_history(state, b, rows, half, pushes, mobility, step, share, 1, 0)
-    return done
+        k += 1
+    store_body(run, work, body.mobility, b, 0)
+    run.done[b] = k
 
 
 @njit(**COMPILE)
-def integrate_bodies(bodies, schedule, state, record, done, first, last, method, step, steps):
-    """Advance bodies first .. last - 1 in place; done (B,) int64 takes their finite steps."""
+def integrate_bodies(bodies, run, first, last):
+    """Advance bodies first .. last - 1 in place."""
     for b in range(first, last):
-        done[b] = integrate_body(b, bodies, schedule, state, record, method, step, steps)
+        integrate_body(bodies, run, b)

@@ -18,13 +18,25 @@ from mcmj.reference.twin.vectors import join, lane, load2, load4, splat2, splat4
 
 
 @njit(**COMPILE)
-def advance_leapfrog(rows, half, force, push, before, mobility, step, share, nodes):
-    """One step; `before` takes the push. Clears the force, returns the sum of the new rows."""
-    total, zero = splat2(0.0), splat2(0.0)
-    for i in range(nodes):
+def prepare_leapfrog(work, k, steps):
+    """s and f_{k-1} before step k of a run."""
+    if k == 1:
+        for lane in range(work.share.size):
+            work.share[lane] = 1.0
+    if k == steps - 1:
+        for i in range(work.before.size):  # faster to compile than a slice
+            work.older[i] = work.before[i]
+
+
+@njit(**COMPILE)
+def advance_leapfrog(body, work, step):
+    """One step; work.before takes the push. Clears the force, returns the sum of the new rows."""
+    rows, half, force, push, before = work.rows, work.half, work.force, work.push, work.before
+    total, zero, share = splat2(0.0), splat2(0.0), splat2(work.share[0])
+    for i in range(rows.size // 4):
         held = load2(push, 2 * i)
         mean = splat2(0.5) * (held + load2(before, 2 * i))
-        kick = splat2(step * mobility[i]) * (splat2(share) * load2(force, 2 * i) + mean)
+        kick = splat2(step * body.mobility[i]) * (share * load2(force, 2 * i) + mean)
         w = load2(half, 2 * i) + kick
         p, v = load2(rows, 4 * i) + splat2(step) * w, w + splat2(0.5) * kick
         store(force, 2 * i, zero)
@@ -36,12 +48,12 @@ def advance_leapfrog(rows, half, force, push, before, mobility, step, share, nod
 
 
 @njit(**COMPILE)
-def advance_leapfrog_pack(rows, half, force, push, before, mobility, step, share, nodes, total):
-    """advance_leapfrog for a pack; share and total (4,): each body's."""
-    sums, zero, reach = splat4(0.0), splat4(0.0), splat4(step)
-    shares = load4(share, 0)
-    for i in range(nodes):
-        scale = reach * load4(mobility, 4 * i)
+def advance_leapfrog_pack(pack, work, step):
+    """advance_leapfrog for a pack; returns each body's sum."""
+    rows, half, force, push, before = work.rows, work.half, work.force, work.push, work.before
+    sums, zero, reach, shares = splat4(0.0), splat4(0.0), splat4(step), load4(work.share, 0)
+    for i in range(rows.size // 16):
+        scale = reach * load4(pack.mobility, 4 * i)
         held = load4(push, 4 * i)
         mean = splat4(0.5) * (held + load4(before, 4 * i))
         store(before, 4 * i, held)
@@ -56,4 +68,4 @@ def advance_leapfrog_pack(rows, half, force, push, before, mobility, step, share
             store(rows, at + 8, v)
             sums += p + v
             mean = zero  # nothing pushes vertically
-    store(total, 0, sums)
+    return sums

@@ -11,15 +11,18 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from mcmj.reference.twin.leapfrog import advance_leapfrog_pack
-from mcmj.reference.twin.rows import copy, load_pack, store_pack, store_pack_history
+from mcmj.reference.twin.leapfrog import advance_leapfrog_pack, prepare_leapfrog
+from mcmj.reference.twin.rows import load_pack, store_pack
 from mcmj.reference.twin.stepping import (
     COMPILE,
+    INLINE,
     LEAPFROG,
     RK4,
+    at_step,
     begin_rk4,
     held_step,
-    method_constants,
+    load_law,
+    new_work,
     rk4_weights,
     spring_force,
     transpose,
@@ -40,24 +43,32 @@ class Packs(NamedTuple):
 
 
 @njit(**COMPILE)
-def pull_nodes(ends, rows, laws, lengths, force, toolbox, per_step):
+def pack_of(packs, index):
+    """One pack: the same fields without the leading axis."""
+    return Packs(
+        packs.ends,
+        packs.laws[index],
+        packs.mobility[index],
+        packs.channels[index],
+        packs.w_out[index],
+        packs.bias[index],
+    )
+
+
+@njit(**INLINE)
+def pull_nodes(pack, work, scheme):
     """Replace each spring's length, and add its force to its ends."""
+    ends, rows, lengths, force = pack.ends, work.rows, work.lengths, work.force
     for j in range(len(ends)):
         tail, head = 16 * ends[j, 0], 16 * ends[j, 1]
-        length, f_x, f_y = spring_force(
+        gap = (
             load4(rows, head) - load4(rows, tail),
             load4(rows, head + 4) - load4(rows, tail + 4),
             load4(rows, head + 8) - load4(rows, tail + 8),
             load4(rows, head + 12) - load4(rows, tail + 12),
-            load4(lengths, 4 * j),
-            load4(laws, 20 * j),
-            load4(laws, 20 * j + 4),
-            load4(laws, 20 * j + 8),
-            load4(laws, 20 * j + 12),
-            load4(laws, 20 * j + 16),
-            toolbox,
-            splat4(per_step),
         )
+        law, before = load_law(pack.laws, 20 * j), load4(lengths, 4 * j)
+        length, f_x, f_y = spring_force(gap, law, before, scheme)
         store(lengths, 4 * j, length)
         tail, head = 8 * ends[j, 0], 8 * ends[j, 1]
         store(force, tail, load4(force, tail) + f_x)
@@ -66,7 +77,7 @@ def pull_nodes(ends, rows, laws, lengths, force, toolbox, per_step):
         store(force, head + 4, load4(force, head + 4) - f_y)
 
 
-@njit(**COMPILE)
+@njit(**INLINE)
 def keep_lengths(lengths, springs, kept, at, stride, present):
     """kept[at + stride * body + j] = length of spring j, for the `present` first bodies."""
     whole = springs // 4 * 4 if present == 4 else 0
@@ -86,32 +97,60 @@ def keep_lengths(lengths, springs, kept, at, stride, present):
             kept[at + stride * body + j] = lengths[4 * j + body]
 
 
-@njit(**COMPILE)
-def find_push(channels, values, nodes, forces, k, first, push):
+@njit(**INLINE)
+def find_values(pack, work, schedule, state, record, now):
+    """Outputs of step k, recorded, and the value of every channel of each body in the pack."""
+    first, k, toolbox = now
+    inputs, offset, gate = schedule.inputs, schedule.offset, schedule.gate
+    lengths, values, outputs = work.lengths, work.values, pack.bias.size // 4
+    pairs, feedback = lengths.size // 8, values.size // 4 - outputs
+    for c in range(outputs):
+        sums = weighted_sum(pack.w_out, c * lengths.size, lengths, pairs)
+        store(values, 4 * (feedback + c), sums + load4(pack.bias, 4 * c))
+    for body in range(min(4, len(state.outputs) - first)):
+        b = first + body
+        for c in range(inputs.shape[2]):
+            values[4 * c + body] = at_step(inputs, b, k, c)
+        for c in range(outputs):
+            at = 4 * (feedback + c) + body
+            output = values[at]
+            fed_back = state.outputs[b, c] if toolbox else output
+            values[at] = gate[min(b, gate.shape[0] - 1), c] * fed_back
+            if offset.shape[2] > 0:
+                values[at] += at_step(offset, b, k, c)
+            state.outputs[b, c] = output
+            if record.outputs.shape[1] > 0:
+                record.outputs[b, k, c] = output
+
+
+@njit(**INLINE)
+def find_push(pack, work, forces, first, k):
     """Horizontal force on each node at step k from the schedule, inputs and feedback."""
+    channels = pack.channels
+    push, values, nodes = work.push, work.values, work.rows.size // 16
     for i in range(nodes):
         total = splat4(0.0)
         for c in range(values.size // 4):
             total += load4(values, 4 * c) * load4(channels, 4 * (c * nodes + i))
         store(push, 4 * i, total)
-    row = min(k, forces.shape[1] - 1)
     for i in range(forces.shape[2]):
         for body in range(4):
-            push[4 * i + body] += forces[min(first + body, forces.shape[0] - 1), row, i]
+            push[4 * i + body] += at_step(forces, first + body, k, i)
 
 
 @njit(**COMPILE)
-def advance_held(rows, force, push, mobility, step, shift, nodes, total):
-    """kernels.advance_held for a pack; total (4,) takes each body's sum of the new state."""
+def advance_held(pack, work, scheme):
+    """kernels.advance_held for a pack; returns each body's sum of the new state."""
+    rows, force, step, shift = work.rows, work.force, splat4(scheme.step), splat4(scheme.shift)
     sums, zero = splat4(0.0), splat4(0.0)
-    for i in range(nodes):
+    for i in range(rows.size // 16):
         at = 16 * i
-        kick = splat4(step) * load4(mobility, 4 * i)
-        d_x = kick * (load4(force, 8 * i) + load4(push, 4 * i))
+        kick = step * load4(pack.mobility, 4 * i)
+        d_x = kick * (load4(force, 8 * i) + load4(work.push, 4 * i))
         d_y = kick * load4(force, 8 * i + 4)
         x, y, u, v = load4(rows, at), load4(rows, at + 4), load4(rows, at + 8), load4(rows, at + 12)
-        x, u = held_step(x, u, d_x, splat4(step), splat4(shift))
-        y, v = held_step(y, v, d_y, splat4(step), splat4(shift))
+        x, u = held_step(x, u, d_x, step, shift)
+        y, v = held_step(y, v, d_y, step, shift)
         store(force, 8 * i, zero)
         store(force, 8 * i + 4, zero)
         store(rows, at, x)
@@ -119,19 +158,23 @@ def advance_held(rows, force, push, mobility, step, shift, nodes, total):
         store(rows, at + 8, u)
         store(rows, at + 12, v)
         sums += (x + y) + (u + v)
-    store(total, 0, sums)
+    return sums
 
 
 @njit(**COMPILE)
-def advance_rk4(stage, rows, start, slope, force, push, mobility, step, nodes, total):
-    """kernels.advance_rk4 for a pack; total (4,) takes each body's sum of rows."""
+def advance_rk4(pack, work, step, stage):
+    """kernels.advance_rk4 for a pack; returns each body's sum of rows."""
+    rows, start, slope, force = work.rows, work.start, work.slope, work.force
     weight, reach, finish = rk4_weights(stage, step)
     all_sums = splat4(0.0)
-    for i in range(nodes):
-        store(force, 8 * i, load4(force, 8 * i) + load4(push, 4 * i))
+    for i in range(rows.size // 16):
+        store(force, 8 * i, load4(force, 8 * i) + load4(work.push, 4 * i))
         for axis in range(2):
             p, v = 16 * i + 4 * axis, 16 * i + 4 * axis + 8
-            p_rate, v_rate = load4(rows, v), load4(mobility, 4 * i) * load4(force, 8 * i + 4 * axis)
+            p_rate, v_rate = (
+                load4(rows, v),
+                load4(pack.mobility, 4 * i) * load4(force, 8 * i + 4 * axis),
+            )
             p_sums = load4(slope, p) + splat4(weight) * p_rate
             v_sums = load4(slope, v) + splat4(weight) * v_rate
             p_new = load4(start, p) + splat4(reach) * p_rate + splat4(finish) * p_sums
@@ -142,100 +185,69 @@ def advance_rk4(stage, rows, start, slope, force, push, mobility, step, nodes, t
             store(rows, v, v_new)
             store(force, 8 * i + 4 * axis, splat4(0.0))
             all_sums += p_new + v_new
-    store(total, 0, all_sums)
+    return all_sums
+
+
+@njit(**INLINE)
+def advance(pack, work, scheme, stage):
+    """kernels.advance for a pack; returns each body's sum of the new state."""
+    if scheme.method == RK4:
+        if stage == 0:
+            begin_rk4(work)
+        return advance_rk4(pack, work, scheme.step, stage)
+    if scheme.method == LEAPFROG:
+        return advance_leapfrog_pack(pack, work, scheme.step)
+    return advance_held(pack, work, scheme)
+
+
+@njit(**INLINE)
+def still_running(run, total, first, k):
+    """Note the bodies that blew up at step k, by their sums; returns if others are left."""
+    running = False
+    for body in range(min(4, run.done.size - first)):
+        b = first + body
+        if run.done[b] == run.steps and not np.isfinite(total[body]):
+            run.done[b] = k
+        running |= run.done[b] == run.steps
+    return running
 
 
 @njit(**COMPILE)
-def find_values(schedule, state, record, w_out, bias, lengths, now, values, sums):
-    """Outputs of step k, recorded, and the value of every channel of each body in the pack."""
-    first, k, toolbox = now
-    n_outputs, pairs = bias.size // 4, lengths.size // 8
-    feedback = values.size // 4 - n_outputs
-    inputs, offset, gate = schedule.inputs, schedule.offset, schedule.gate
-    for c in range(n_outputs):
-        store(sums, 4 * c, weighted_sum(w_out, c * lengths.size, lengths, pairs))
-    for body in range(4):
-        b = min(first + body, len(state.outputs) - 1)
-        for c in range(inputs.shape[2]):
-            row = min(k, inputs.shape[1] - 1)
-            values[4 * c + body] = inputs[min(b, inputs.shape[0] - 1), row, c]
-        for c in range(n_outputs):
-            output = sums[4 * c + body] + bias[4 * c + body]
-            fed_back = state.outputs[b, c] if toolbox else output
-            value = gate[min(b, gate.shape[0] - 1), c] * fed_back
-            if offset.shape[2] > 0:
-                row = min(k, offset.shape[1] - 1)
-                value += offset[min(b, offset.shape[0] - 1), row, c]
-            values[4 * (feedback + c) + body] = value
-            if first + body == b:
-                state.outputs[b, c] = output
-                if record.outputs.shape[1] > 0:
-                    record.outputs[b, k, c] = output
-
-
-@njit(**COMPILE)
-def integrate_pack(pack, packs, schedule, state, record, done, method, step, steps):
-    """Advance the bodies 4 pack .. 4 pack + 3 in place; done takes their finite steps.
+def integrate_pack(packs, run, index):
+    """Advance the bodies 4 index .. 4 index + 3 in place.
 
     What is recorded of a diverged body after its last finite step means nothing.
     """
-    first = 4 * pack
-    present = min(4, len(done) - first)
-    ends, laws, mobility = packs.ends, packs.laws[pack], packs.mobility[pack]
-    channels, w_out, bias = packs.channels[pack], packs.w_out[pack], packs.bias[pack]
-    springs, nodes = len(ends), mobility.size // 4
-    rows, start, slope = np.zeros(16 * nodes), np.zeros(16 * nodes), np.zeros(16 * nodes)
-    force, push = np.zeros(8 * nodes), np.zeros(4 * nodes)
-    lengths, values = np.zeros(8 * ((springs + 1) // 2)), np.zeros(channels.size // nodes)
-    half, before, older = np.zeros(8 * nodes), np.zeros(4 * nodes), np.zeros(4 * nodes)
-    sums, total, share = np.zeros(bias.size), np.zeros(4), np.ones(4)
-    kept, (_, rows_kept, row_size) = record.lengths.reshape(-1), record.lengths.shape
-    stages, shift, toolbox = method_constants(method)
-    per_step = 1.0 / step
-
-    leapfrog = method == LEAPFROG
-    load_pack(state, first, mobility, rows, lengths, springs, half, before, share, leapfrog)
+    pack, first, schedule, scheme = pack_of(packs, index), 4 * index, run.schedule, run.scheme
+    present, springs, nodes = min(4, run.done.size - first), len(pack.ends), pack.mobility.size // 4
+    lengths = np.zeros(8 * ((springs + 1) // 2))
+    work = new_work(nodes, pack.channels.size // pack.mobility.size, lengths, 4)
+    kept, (_, rows_kept, row_size) = run.record.lengths.reshape(-1), run.record.lengths.shape
+    total = np.zeros(4)
+    state, record, forces = run.state, run.record, schedule.forces
+    load_pack(run, work, pack.mobility, first)
     for body in range(present):
-        done[first + body] = steps
-    for k in range(steps):
-        for stage in range(stages):
-            pull_nodes(ends, rows, laws, lengths, force, toolbox, per_step)
+        run.done[first + body] = run.steps
+    for k in range(run.steps):
+        if scheme.method == LEAPFROG:
+            prepare_leapfrog(work, k, run.steps)
+        for stage in range(scheme.stages):
+            pull_nodes(pack, work, scheme)
             if stage == 0:  # inputs, outputs and offsets hold for the whole step
                 if rows_kept > 0:
                     at = (first * rows_kept + k) * row_size
                     keep_lengths(lengths, springs, kept, at, rows_kept * row_size, present)
-                now = first, k, toolbox
-                find_values(schedule, state, record, w_out, bias, lengths, now, values, sums)
-                find_push(channels, values, nodes, schedule.forces, k, first, push)
-            if method == RK4:
-                if stage == 0:
-                    begin_rk4(rows, start, slope)
-                advance_rk4(stage, rows, start, slope, force, push, mobility, step, nodes, total)
-            elif leapfrog:
-                if k == steps - 1:
-                    copy(before, older)
-                if k == 1:
-                    share[0] = share[1] = share[2] = share[3] = 1.0
-                advance_leapfrog_pack(
-                    rows, half, force, push, before, mobility, step, share, nodes, total
-                )
-            else:
-                advance_held(rows, force, push, mobility, step, shift, nodes, total)
-        running = False
-        for body in range(present):
-            if done[first + body] == steps and not np.isfinite(total[body]):
-                done[first + body] = k
-            running |= done[first + body] == steps
-        if not running:
+                now = first, k, scheme.toolbox
+                find_values(pack, work, schedule, state, record, now)
+                find_push(pack, work, forces, first, k)
+            store(total, 0, advance(pack, work, scheme, stage))
+        if not still_running(run, total, first, k):
             break
-    store_pack(state, first, present, rows, lengths, springs)
-    if leapfrog and steps > 0:
-        pushes = before, older
-        store_pack_history(state, first, present, rows, half, pushes, mobility, step, share)
+    store_pack(run, work, pack.mobility, first)
 
 
 @njit(**COMPILE)
-def integrate_packs(packs, schedule, state, record, done, first, last, method, step, steps):
-    """Advance packs first .. last - 1 in place; done (B,) int64 takes the finite steps."""
-    for pack in range(first, last):
-        integrate_pack(pack, packs, schedule, state, record, done, method, step, steps)
+def integrate_packs(packs, run, first, last):
+    """Advance packs first .. last - 1 in place."""
+    for index in range(first, last):
+        integrate_pack(packs, run, index)

@@ -19,7 +19,7 @@ from mcmj.reference.twin.layout import (
     to_schedule,
 )
 from mcmj.reference.twin.packs import Packs, integrate_packs
-from mcmj.reference.twin.stepping import LEAPFROG, METHODS, KernelState, Record
+from mcmj.reference.twin.stepping import LEAPFROG, METHODS, KernelState, Record, Run, scheme_of
 from mcmj.utils.errors import DivergenceError, InvalidArgumentError, UnknownNameError
 from mcmj.utils.validation import Array, require_count, require_number
 
@@ -118,11 +118,11 @@ class Population:
         done = np.zeros(len(self.bodies), np.int64)
         kernel = integrate_packs if self._packed else integrate_bodies
 
+        scheme = scheme_of(self.method, float(self.timestep))
+        run = Run(schedule, self._state, record, done, scheme, steps)
+
         def part(first: int, last: int) -> None:
-            kernel(
-                self._layout, schedule, self._state, record, done, first, last,
-                METHODS[self.method], float(self.timestep), steps,
-            )  # fmt: skip
+            kernel(self._layout, run, first, last)
 
         count = len(self._layout.laws)
         share = max(1, count // (4 * self.threads))  # some calls a thread: all end together

@@ -36,6 +36,9 @@ COMPILE: dict[str, Any] = {
     "nogil": True,
     "cache": True,
 }
+# For what an inner loop calls with many arrays: a call would copy their descriptions. Numba must
+# find that arguments need no reference counts, so such a function returns in one place only.
+INLINE: dict[str, Any] = {**COMPILE, "forceinline": True}
 
 
 class Schedule(NamedTuple):
@@ -64,25 +67,100 @@ class Record(NamedTuple):
     outputs: np.ndarray  # (B, T or 0, n_out)
 
 
-@njit(**COMPILE)
-def spring_pull(x1, x2, k1, k3, d1, d3):
-    """p(x1) + q(x2), N: what a stretched, lengthening spring pulls with."""
-    return x1 * (k1 + k3 * x1 * x1) + x2 * (d1 + d3 * x2 * x2)
+class Scheme(NamedTuple):
+    """A method and its step."""
+
+    method: int  # one of METHODS' numbers
+    step: float  # s
+    per_step: float  # 1 / step
+    stages: int  # force evaluations a step
+    shift: float  # see held_step
+    toolbox: bool  # springs and feedback look one step back
+
+
+class Run(NamedTuple):
+    """`steps` steps of B bodies."""
+
+    schedule: Schedule
+    state: KernelState
+    record: Record
+    done: np.ndarray  # (B,) int64: takes every body's finite steps
+    scheme: Scheme
+    steps: int
+
+
+class Work(NamedTuple):
+    """Scratch of `width` bodies side by side: 1, or 4 in a pack; see `rows` for the layout."""
+
+    rows: np.ndarray  # (4 N width,) position and velocity of each node, m, m/s
+    force: np.ndarray  # (2 N width,) N, by the springs; cleared by each stage
+    push: np.ndarray  # horizontal force on each node by schedule, inputs and feedback, N
+    lengths: np.ndarray  # of the springs, m
+    values: np.ndarray  # (n_channels width,): inputs, then what is fed back
+    start: np.ndarray  # Runge-Kutta: rows at t_k
+    slope: np.ndarray  # Runge-Kutta: weighted sum of the slopes
+    half: np.ndarray  # leapfrog: velocities half a step back, m/s
+    before: np.ndarray  # leapfrog: push of the step before
+    older: np.ndarray  # leapfrog: and of the one before that, at a run's end
+    share: np.ndarray  # (width,) leapfrog: s of the step
+
+
+def scheme_of(method: str, step: float) -> Scheme:
+    """The scheme of a method, one of METHODS, with a step in s."""
+    number = METHODS[method]
+    shift = {SEMI_IMPLICIT_EULER: 1.0, TOOLBOX_RK: 0.5}.get(number, 0.0)
+    return Scheme(
+        number, step, 1.0 / step, 4 if number == RK4 else 1, shift, number >= TOOLBOX_EULER
+    )
 
 
 @njit(**COMPILE)
-def spring_force(x, y, u, v, before, l0, k1, k3, d1, d3, toolbox, per_step):
-    """Four springs from the gaps between their ends (m, m/s): lengths, forces on the tails.
+def new_work(nodes, channels, lengths, width):
+    """Scratch for bodies of so many nodes and channels."""
+    size = nodes * width
+    rows, start, slope = np.zeros(4 * size), np.zeros(4 * size), np.zeros(4 * size)
+    force, half, values = np.zeros(2 * size), np.zeros(2 * size), np.zeros(channels * width)
+    gaps = 2 * size + 6  # find_push fills four nodes at a time
+    push, before, older = np.zeros(gaps), np.zeros(gaps), np.zeros(gaps)
+    share = np.ones(width)
+    return Work(rows, force, push, lengths, values, start, slope, half, before, older, share)
 
-    The toolbox methods take dl/dt as the change since the last step, others from velocities.
+
+@njit(**COMPILE)
+def at_step(values, b, k, c):
+    """Element c of body b at step k; an axis of size 1 is shared."""
+    return values[min(b, values.shape[0] - 1), min(k, values.shape[1] - 1), c]
+
+
+@njit(**COMPILE)
+def load_law(laws, at):
+    """l0, k1, k3, d1, d3 of four springs."""
+    return (
+        load4(laws, at),
+        load4(laws, at + 4),
+        load4(laws, at + 8),
+        load4(laws, at + 12),
+        load4(laws, at + 16),
+    )
+
+
+@njit(**COMPILE)
+def spring_force(gap, law, before, scheme):
+    """Four springs from the gaps (x, y, u, v) between their ends (m, m/s).
+
+    Returns their lengths and the forces (f_x, f_y) on their tails. The toolbox methods take
+    dl/dt as the change since the length `before`, others from the velocities.
     """
+    x, y, u, v = gap
+    l0, k1, k3, d1, d3 = law
     square = x * x + y * y
     length = square_root(square)
     inverse = length * (splat4(1.0) / square)  # neither root nor quotient waits for the other
-    rate = (x * u + y * v) * inverse
-    if toolbox:
-        rate = (length - before) * per_step
-    tension = spring_pull(length - l0, rate, k1, k3, d1, d3) * inverse
+    x1, x2 = length - l0, (x * u + y * v) * inverse
+    if scheme.toolbox:
+        x2 = (length - before) * splat4(scheme.per_step)
+    pull = x1 * (k1 + k3 * x1 * x1) + x2 * (d1 + d3 * x2 * x2)
+    tension = pull * inverse
     return length, x * tension, y * tension
 
 
@@ -110,13 +188,6 @@ def weighted_sum(weights, at, lengths, pairs):
 
 
 @njit(**COMPILE)
-def method_constants(method):
-    """Stages a step, shift of held_step, and whether springs and feedback look back."""
-    shift = 1.0 if method == SEMI_IMPLICIT_EULER else 0.5 if method == TOOLBOX_RK else 0.0
-    return (4 if method == RK4 else 1), shift, method >= TOOLBOX_EULER
-
-
-@njit(**COMPILE)
 def held_step(p, v, change, step, shift):
     """Position and velocity after a step with held force, of which `change` = step * a."""
     return p + step * (v + shift * change), v + change
@@ -132,8 +203,8 @@ def rk4_weights(stage, step):
 
 
 @njit(**COMPILE)
-def begin_rk4(rows, start, slope):
+def begin_rk4(work):
     """Remember the state at t_k."""
-    for i in range(rows.size):
-        start[i] = rows[i]
-        slope[i] = 0.0
+    for i in range(work.rows.size):
+        work.start[i] = work.rows[i]
+        work.slope[i] = 0.0
