@@ -15,10 +15,12 @@ from mcmj.learning.teaching import Course, lessons_of
 from mcmj.simulation.simulation import Simulation
 from mcmj.targets.limit_cycles import Target
 from mcmj.utils.errors import DivergenceError
-from mcmj.utils.validation import Array, require_count, require_number
+from mcmj.utils.validation import Array, require_count
 
 NOISES = (0.02, 0.05, 0.1, 0.2, 0.4)
 RIDGES_PER_ROW = (0.0, 1e-10, 1e-8, 1e-6, 1e-4)
+FREE_RUN = 40.0  # s
+WINDOW = 20.0  # s: its last part, which counts
 
 
 @dataclass(frozen=True)
@@ -51,8 +53,6 @@ def select_teaching(
     noises: Sequence[float] = NOISES,
     ridges_per_row: Sequence[float] = RIDGES_PER_ROW,
     starts: int = 4,
-    free_run: float = 40.0,
-    window: float = 20.0,
 ) -> Selection:
     """Choose ridge and teacher noise by the orbit error of free runs from held-out starts.
 
@@ -66,7 +66,6 @@ def select_teaching(
         noises: standard deviations of the teacher noise (units of the output).
         ridges_per_row: as Teaching's.
         starts: number of held-out starts.
-        free_run, window: length of each free run, and of its last part that counts [s].
 
     Raises:
         DivergenceError: the body blew up under the teacher, or with every candidate.
@@ -74,7 +73,6 @@ def select_teaching(
     """
     require_count("noises", len(noises), 1)
     require_count("ridges_per_row", len(ridges_per_row), 1)
-    require_number("window", window, 0.0, free_run, open_low=True)
     begin = held_out_starts(simulation, target, teaching, seed, starts)
     shape = (len(noises), len(ridges_per_row))
     errors, nrmse = np.full(shape, np.inf), np.full(shape, np.inf)
@@ -86,7 +84,7 @@ def select_teaching(
         for j, ridge in enumerate(ridges_per_row):
             fit = course.regression.solve(ridge * course.regression.weight)
             runs = closed_loop_errors(
-                simulation, fit.w_out, begin, target, free_run=free_run, window=window
+                simulation, fit.w_out, begin, target, free_run=FREE_RUN, window=WINDOW
             )
             errors[i, j], nrmse[i, j] = runs.max(), fit.train_nrmse
             readouts[i, j] = fit.w_out

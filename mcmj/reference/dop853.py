@@ -71,29 +71,22 @@ def integrate_continuous(
     readout: Readout,
     timestep: float,
     start: State,
-    *,
-    gate: Array,
     inputs: Signal | None,
-    offset: Signal | None,
-    rtol: float,
 ) -> Trajectory:
-    """Feedback and signals act continuously: the integrator may take long steps.
+    """Feedback and inputs act continuously: the integrator may take long steps.
 
     Args:
-        inputs, offset: functions of time [s] -> (n_inputs,), (n_outputs,); smooth ones.
+        inputs: a smooth function of time [s] -> (n_inputs,).
     """
 
     def push(t: float, positions: Array) -> Array:
         lengths = spring_lengths(positions, body.springs)
-        fed_back = gate * readout.outputs(lengths)
-        if offset is not None:
-            fed_back = fed_back + offset(t)
-        force = body.w_fb @ fed_back
+        force = body.w_fb @ readout.outputs(lengths)
         return force if inputs is None else force + body.w_in @ inputs(t)
 
     state = np.concatenate([start.positions.ravel(), start.velocities.ravel()])
     times = start.time + timestep * np.arange(steps + 1, dtype=np.float64)
-    states, _ = _solve(body, push, state, times, rtol, None)
+    states, _ = _solve(body, push, state, times, RTOL, None)
     positions = states[:-1, : 2 * body.n_nodes].reshape(-1, body.n_nodes, 2)
     lengths = spring_lengths(positions, body.springs)
     return _trajectory(body, lengths, states[-1], readout, timestep, start)

@@ -23,7 +23,7 @@ from mcmj.reference.dop853 import RTOL, SMALLEST_RTOL, Signal, integrate_continu
 from mcmj.reference.twin.population import Population, rest
 from mcmj.reference.twin.stepping import METHODS as TWINS
 from mcmj.utils.errors import UnknownNameError
-from mcmj.utils.validation import as_array, require_number
+from mcmj.utils.validation import MOST_STEPS, as_array, require_count, require_number
 
 METHODS = ("dop853", *TWINS)
 
@@ -83,55 +83,34 @@ def integrate_smooth(
     body: Body,
     *,
     steps: int,
-    timestep: float = 1e-3,
     inputs: Signal | None = None,
-    offset: Signal | None = None,
-    gate: object = None,
     w_out: object = None,
     initial_state: State | None = None,
-    rtol: float = RTOL,
 ) -> Trajectory:
-    """DOP853 with feedback and signals acting continuously, Eq. (6) as written.
+    """DOP853 with feedback and inputs acting continuously, Eq. (6) as written.
 
     The integrator takes steps as long as the motion is smooth.
 
     Args:
-        steps, timestep: samples to record, and their spacing [s].
-        inputs, offset: smooth functions of time [s] -> (n_inputs,), (n_outputs,).
-        gate, w_out, initial_state, rtol: as for `integrate`.
+        steps: samples to record, 1 ms apart.
+        inputs: a smooth function of time [s] -> (n_inputs,).
+        w_out, initial_state: as for `integrate`.
 
     Raises:
         DivergenceError, InvalidArgumentError: as for `integrate`.
     """
+    require_count("steps", steps, 1, MOST_STEPS)
     readout = Readout.of(w_out, body.n_springs, body.n_outputs)
-    drive = check_drive(
-        body,
-        steps=steps,
-        inputs=None,
-        offset=None,
-        gate=gate,
-        forces=None,
-        closed=w_out is not None,
-    )
-    require_number("timestep", timestep, 0.0, open_low=True)
-    require_number("rtol", rtol, SMALLEST_RTOL, 1e-2)
     return integrate_continuous(
-        body,
-        steps,
-        readout,
-        timestep,
-        _checked_state(body, initial_state),
-        gate=drive.gate,
-        inputs=inputs,
-        offset=offset,
-        rtol=rtol,
+        body, steps, readout, 1e-3, _checked_state(body, initial_state), inputs
     )
 
 
 def _integrate_twin(
     body: Body, drive: Drive, readout: Readout, method: str, timestep: float, start: State
 ) -> Trajectory:
-    population = Population([body], [readout], method=method, timestep=timestep, states=[start])
+    population = Population([body], [readout], method=method, timestep=timestep)
+    population.set_states([start])
     record, done = population.run(drive, 0, drive.steps)
     if done[0] < drive.steps:
         raise population.divergence(0, int(done[0]), drive.steps)

@@ -56,7 +56,6 @@ def teach_lift(
     *,
     stride: Stride | None = None,
     duration: float = 60.0,
-    timestep: float = 1e-3,
     engine: str = "mujoco",
 ) -> tuple[LegReadout, Fit]:
     """Fit the readout of the lift while the body runs a gait by itself, in closed loop.
@@ -73,11 +72,11 @@ def teach_lift(
     """
     require_number("duration", duration, target.period)
     swing = checked_readout(body, w_out)
-    simulation = Simulation(body, timestep=timestep, engine=engine)
+    simulation = Simulation(body, engine=engine)
     synchronise(simulation, target, SYNCHRONISE)
     simulation.set_readout(swing)
-    simulation.rollout(round(SETTLE / timestep), record=())
-    run = simulation.rollout(round(duration / timestep))
+    simulation.rollout(round(SETTLE / simulation.timestep), record=())
+    run = simulation.rollout(round(duration / simulation.timestep))
     regression = Regression(bias=True)
     lifts = lift_of(run.get("outputs"))[::THIN]
     regression.add(run.get("lengths")[::THIN], lifts)

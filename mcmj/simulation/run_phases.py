@@ -1,7 +1,7 @@
 """Phases run one after the other in the compiled loop, reproducible from a seed."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -69,7 +69,11 @@ def run_schedule(
     feedback: list[Array] = []
     for phase, steps in zip(schedule.phases, counts, strict=True):
         last = feedback[-1][-1] if feedback else None
-        for part, pushed in _run_phase(simulation, phase, steps, last, forces, noise, record):
+        if isinstance(phase.forces, RandomForces):
+            scale = phase.forces.scale
+            pattern = forces.uniform(-scale, scale, simulation.body.n_nodes)
+            phase = replace(phase, forces=pattern)
+        for part, pushed in _run_phase(simulation, phase, steps, last, noise, record):
             parts.append(part)
             feedback.append(pushed)
             on_steps(len(part))
@@ -82,7 +86,6 @@ def _run_phase(
     phase: Phase,
     steps: int,
     last: Array | None,
-    forces_of: np.random.Generator,
     noise_of: np.random.Generator,
     record: Sequence[str],
 ) -> Iterator[tuple[Trajectory, Array]]:
@@ -92,9 +95,6 @@ def _run_phase(
         simulation.set_readout(phase.w_out)
     if phase.cut or phase.masses is not None:
         simulation.alter(cut=phase.cut, masses=phase.masses)
-    forces = phase.forces
-    if isinstance(forces, RandomForces):
-        forces = forces_of.uniform(-forces.scale, forces.scale, body.n_nodes)
     gate, constant = _gate_and_offset(simulation, phase, last)
     for start in range(0, steps, CHUNK):
         n = min(CHUNK, steps - start)
@@ -103,7 +103,7 @@ def _run_phase(
             noise = phase.length_noise * noise_of.standard_normal((n, body.n_springs))
             offset += gate * simulation.readout.weighted(noise)
         part = simulation.rollout(
-            offset=offset, gate=gate, forces=forces, record=tuple({*record, "outputs"})
+            offset=offset, gate=gate, forces=phase.forces, record=tuple({*record, "outputs"})
         )
         yield part, gate * part.get("outputs") + offset
 

@@ -7,6 +7,7 @@ from scipy.stats import quantile_test
 from mcmj.analysis.stability.basin import on_cycle
 from mcmj.analysis.stability.tolerance import (
     Tolerance,
+    Trial,
     force_tolerance,
     largest_tolerated,
     noise_tolerance,
@@ -48,7 +49,7 @@ def test_too_few_copies_have_no_interval():
 def test_a_bodys_tolerances_lie_within_their_range_and_repeat(taught_loop, bisect):
     loop, cycle, goal = taught_loop
     states = on_cycle(loop, cycle, 4)
-    found, again = (bisect(loop, goal, states, recovery=30.0, ratio=2.0) for _ in range(2))
+    found, again = (bisect(loop, goal, states, Trial(recovery=30.0, ratio=2.0)) for _ in range(2))
     np.testing.assert_array_equal(found.values, again.values)
     assert (found.values > 0.0).all()
     assert found.values.max() < (1e4 if bisect is force_tolerance else 1e2)

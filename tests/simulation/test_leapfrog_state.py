@@ -44,14 +44,11 @@ def test_packs_are_the_single_bodies():
     bodies = [replace(body, k1=body.k1 * f, masses=body.masses * f) for f in (1.0, 1.5, 2, 0.7, 3)]
     readouts = [readout(body, 0.5 * i) for i in range(5)]
     starts = [kicked(body, 0.1 * i) for i in range(5)]
-    drive = check_drive(
-        body, steps=300, inputs=None, offset=None, gate=None, forces=push(body), closed=True
-    )
+    drive = check_drive(body, steps=300, forces=push(body), closed=True)
 
     def run(packed, *parts):
-        population = Population(
-            bodies, readouts, method="leapfrog", states=starts, packed=packed, threads=2
-        )
+        population = Population(bodies, readouts, method="leapfrog", packed=packed, threads=2)
+        population.set_states(starts)
         for first, last in parts:
             population.run(drive, first, last)
         return population.states

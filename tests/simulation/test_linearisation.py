@@ -5,7 +5,7 @@ from networks import network, readout, simulation
 import mcmj
 from mcmj.core.integrators import INTEGRATORS
 from mcmj.reference.dop853 import accelerations
-from mcmj.simulation.stepsize.linearisation import linear_system, linearise
+from mcmj.simulation.stepsize.linearisation import Motion, linear_system, linearise
 from mcmj.simulation.stepsize.schemes import step_map
 
 
@@ -38,8 +38,8 @@ def test_a_law_of_your_own_has_its_slopes_by_differences():
     linear = mcmj.Body(**{n: getattr(body, n) for n in ("positions", "springs", "k1", "k3", "d1")},
                        d3=np.zeros(body.n_springs), masses=body.masses)  # fmt: skip
     for secant in (False, True):
-        own = linear_system(body, elongation=0.1, speed=0.3, secant=secant, springs=law)
-        native = linear_system(linear, elongation=0.1, speed=0.3, secant=secant)
+        own = linear_system(body, motion=Motion(0.1, 0.3, secant), springs=law)
+        native = linear_system(linear, motion=Motion(0.1, 0.3, secant))
         for name in ("material", "geometric", "damping"):
             a, b = getattr(own, name).toarray(), getattr(native, name).toarray()
             np.testing.assert_allclose(a, b, atol=1e-5)

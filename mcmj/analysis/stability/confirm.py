@@ -6,10 +6,13 @@ from mcmj.analysis.stability.basin import judge, pushed, survey
 from mcmj.analysis.stability.cycle import Cycle, weights_at
 from mcmj.analysis.stability.floquet import Floquet
 from mcmj.analysis.stability.loop import ClosedLoop
+from mcmj.analysis.stability.tolerance import Trial
 from mcmj.simulation.ensemble import Ensemble
 from mcmj.targets.limit_cycles import Target
 from mcmj.utils.errors import DivergenceError
 from mcmj.utils.validation import Array
+
+EPS = 1e-4  # width of the differences, m and m/s
 
 
 def ensemble_map(loop: ClosedLoop, states: Array, duration: float) -> Array:
@@ -37,11 +40,11 @@ def directional(
     return (ends[: len(directions)] - ends[len(directions) :]) / (2 * eps)
 
 
-def monodromy_error(loop: ClosedLoop, cycle: Cycle, analysis: Floquet, eps: float = 1e-4) -> float:
+def monodromy_error(loop: ClosedLoop, cycle: Cycle, analysis: Floquet) -> float:
     """Of the phase's and the leading direction d in MuJoCo: largest |D d - M d| / |d|."""
     leading = analysis.leading_vector.real / np.linalg.norm(analysis.leading_vector.real)
     unit = np.stack([cycle.tangent / np.linalg.norm(cycle.tangent), leading])
-    moved = directional(loop, cycle.state, unit, cycle.period, eps)
+    moved = directional(loop, cycle.state, unit, cycle.period, EPS)
     return float(np.linalg.norm(moved - unit @ analysis.monodromy.T, axis=1).max())
 
 
@@ -50,31 +53,28 @@ def verdicts(
     target: Target,
     states: Array,
     forces: Array,
-    hold: float,
-    recovery: float,
-    threshold: float = 0.05,
+    trial: Trial,
 ) -> tuple[int, int]:
     """Pushes that MuJoCo judges as the twin does, and how many were compared.
 
-    Copies (B, n) are pushed by constant forces (B, N) [N] for `hold` [s], without refined
+    Copies (B, n) are pushed by constant forces (B, N) [N], without refined
     steps; compared are those that the twin survives. None agrees if MuJoCo blows up in one.
     """
-    twin = survey(
-        loop, target, pushed(loop, states, forces, hold), duration=recovery, threshold=threshold
-    )
+    after = pushed(loop, states, forces, trial.hold)
+    twin = survey(loop, target, after, duration=trial.recovery, threshold=trial.threshold)
     alive = np.flatnonzero(~twin.blown)
     if not alive.size:
         return 0, 0
     ensemble = _ensemble(loop, states[alive])
-    rows = np.repeat(forces[alive, None], round(hold / loop.timestep), axis=1)
+    rows = np.repeat(forces[alive, None], round(trial.hold / loop.timestep), axis=1)
     try:
         ensemble.rollout(forces=rows, record=())
-        free = ensemble.rollout(round(recovery / loop.timestep), record=("outputs",))
+        free = ensemble.rollout(round(trial.recovery / loop.timestep), record=("outputs",))
     except DivergenceError:
         return 0, len(alive)
     judged = judge(
         free.get("outputs"), np.ones(len(alive), np.bool_), loop.timestep, target,
-        2 * target.period, threshold,
+        2 * target.period, trial.threshold,
     )  # fmt: skip
     return int((judged.recovered == twin.recovered[alive]).sum()), len(alive)
 

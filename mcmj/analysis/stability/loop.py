@@ -111,7 +111,7 @@ class ClosedLoop:
         start = as_array("states", states, (None, self.size))
         copies = len(start)
         drive = check_drive(
-            self.body, steps=steps, inputs=None, offset=offset, gate=gate, forces=forces,
+            self.body, steps=steps, offset=offset, gate=gate, forces=forces,
             closed=self.w_out is not None, copies=copies,
         )  # fmt: skip
         population = self._population(start)
@@ -121,10 +121,8 @@ class ClosedLoop:
     def trail(self, state: Array, stride: int, samples: int) -> Array:
         """States (samples, n) every `stride` steps of the undisturbed run from a state (n,)."""
         population = self._population(np.asarray(state)[None])
-        drive = check_drive(
-            self.body, steps=max(1, stride), inputs=None, offset=None, gate=None, forces=None,
-            closed=self.w_out is not None,
-        )  # fmt: skip
+        closed = self.w_out is not None
+        drive = check_drive(self.body, steps=max(1, stride), closed=closed)
         states = [np.asarray(state)[None]]
         for _ in range(samples - 1):
             population.run(drive, 0, drive.steps, lengths=False)
@@ -152,10 +150,12 @@ class ClosedLoop:
     def _population(self, states: Array) -> Population:
         copies = len(states)
         pairs = zip(*self.nodes(states), strict=True)
-        return Population(
+        population = Population(
             [self.body] * copies, [self.w_out] * copies, method=METHOD, timestep=self.timestep,
-            states=[State(p, v) for p, v in pairs], threads=self.threads, packed=copies > 1,
+            threads=self.threads, packed=copies > 1,
         )  # fmt: skip
+        population.set_states([State(p, v) for p, v in pairs])
+        return population
 
     def _vectors(self, population: Population) -> Array:
         now, free = population.kernel_state, self.body.free

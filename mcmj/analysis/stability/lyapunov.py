@@ -15,6 +15,9 @@ from mcmj.analysis.stability.loop import ClosedLoop
 from mcmj.utils.seeds import stream
 from mcmj.utils.validation import Array, require_count, require_number
 
+PAIRS = 4  # trajectories started in random directions
+DISTANCE = 1e-6  # d_0, in units of the scale: far above rounding, far below curvature
+
 
 @dataclass(frozen=True)
 class Exponent:
@@ -41,8 +44,6 @@ def lyapunov_exponent(
     intervals: int = 40,
     transient: int = 5,
     scale: object = 1.0,
-    pairs: int = 4,
-    distance: float = 1e-6,
     seed: int = 0,
 ) -> Exponent:
     """Largest exponent along the trajectory through a state (n,).
@@ -53,29 +54,25 @@ def lyapunov_exponent(
         intervals: that count.
         transient: intervals before them, for the direction to turn to the fastest.
         scale: (n,) or a number, the units of the coordinates.
-        pairs: trajectories started in random directions.
-        distance: d_0 in these units: far above rounding, far below curvature.
-        seed: of the directions.
+        seed: of the PAIRS first directions.
 
     Raises:
         DivergenceError: a trajectory blew up.
         InvalidArgumentError: an argument out of bounds.
     """
     require_number("interval", interval, loop.timestep)
-    require_number("distance", distance, 0.0, open_low=True)
     for name, count, low in (("intervals", intervals, 1), ("transient", transient, 0)):
         require_count(name, count, low)
-    require_count("pairs", pairs, 1)
     units = np.broadcast_to(np.asarray(scale, dtype=np.float64), (loop.size,))
     steps = max(1, round(interval / loop.timestep))
-    apart = stream(seed, "initial_state").standard_normal((pairs, loop.size))
-    growth = np.empty((transient + intervals, pairs))
+    apart = stream(seed, "initial_state").standard_normal((PAIRS, loop.size))
+    growth = np.empty((transient + intervals, PAIRS))
     here = np.asarray(state, dtype=np.float64)
     for i in range(transient + intervals):
-        apart *= distance / np.linalg.norm(apart, axis=1, keepdims=True)
+        apart *= DISTANCE / np.linalg.norm(apart, axis=1, keepdims=True)
         ends = loop.advance(np.vstack([here, here + apart * units]), steps)
         here, apart = ends[0], (ends[1:] - ends[0]) / units
-        growth[i] = np.log(np.linalg.norm(apart, axis=1) / distance)
+        growth[i] = np.log(np.linalg.norm(apart, axis=1) / DISTANCE)
     rates = growth[transient:] / (steps * loop.timestep)
     times = steps * loop.timestep * np.arange(1, intervals + 1, dtype=np.float64)
     running: Array = np.cumsum(rates.mean(axis=1), dtype=np.float64) / np.arange(

@@ -14,6 +14,27 @@ from mcmj.targets.limit_cycles import Target
 from mcmj.utils.seeds import stream
 from mcmj.utils.validation import Array, require_number
 
+RATIO = 1.1  # bounds as close as that end a bisection
+FORCES = 0.1, 1e4  # where to look [N]
+NOISES = 1e-5, 1e2  # [m]
+
+
+@dataclass(frozen=True)
+class Trial:
+    """A disturbance, and what is a recovery from it.
+
+    Attributes:
+        hold: how long it acts [s].
+        recovery: time to come back [s].
+        threshold: largest orbit error of a recovery.
+        ratio: of the bounds between which an amplitude is known, at the end of a search.
+    """
+
+    hold: float = 10.0
+    recovery: float = 40.0
+    threshold: float = 0.05
+    ratio: float = RATIO
+
 
 @dataclass(frozen=True)
 class Tolerance:
@@ -57,7 +78,7 @@ def largest_tolerated(
     low: float,
     high: float,
     *,
-    ratio: float = 1.1,
+    ratio: float = RATIO,
 ) -> Tolerance:
     """Bisect each copy's amplitude on a logarithmic scale, taking its recovery to be monotone.
 
@@ -84,13 +105,8 @@ def force_tolerance(
     loop: ClosedLoop,
     target: Target,
     states: Array,
+    trial: Trial,
     *,
-    low: float = 0.1,
-    high: float = 1e4,
-    hold: float = 10.0,
-    recovery: float = 40.0,
-    threshold: float = 0.05,
-    ratio: float = 1.1,
     refine: int = 1,
     seed: int = 0,
 ) -> Tolerance:
@@ -99,31 +115,24 @@ def force_tolerance(
     Every copy (B, n) has its own pattern, the same at every F.
 
     Args:
-        hold: how long the forces act [s].
-        recovery: time to come back [s].
         refine: smaller steps while the forces act; see `basin.pushed`.
     """
     generator = stream(seed, "forces")
     pattern = generator.uniform(-1.0, 1.0, (len(states), loop.body.n_nodes))
 
     def recovers(amplitudes: Array) -> npt.NDArray[np.bool_]:
-        after = pushed(loop, states, amplitudes[:, None] * pattern, hold, refine=refine)
-        return survey(loop, target, after, duration=recovery, threshold=threshold).recovered
+        after = pushed(loop, states, amplitudes[:, None] * pattern, trial.hold, refine=refine)
+        return _recovered(loop, target, after, trial)
 
-    return largest_tolerated(recovers, len(states), low, high, ratio=ratio)
+    return largest_tolerated(recovers, len(states), *FORCES, ratio=trial.ratio)
 
 
 def noise_tolerance(
     loop: ClosedLoop,
     target: Target,
     states: Array,
+    trial: Trial,
     *,
-    low: float = 1e-5,
-    high: float = 1e2,
-    hold: float = 10.0,
-    recovery: float = 40.0,
-    threshold: float = 0.05,
-    ratio: float = 1.1,
     seed: int = 0,
 ) -> Tolerance:
     """White noise on all lengths for a while (Fig. 6e): largest standard deviation [m].
@@ -131,12 +140,19 @@ def noise_tolerance(
     Every copy (B, n) has its own noise, the same but for its size at every level. Arguments as
     for `force_tolerance`.
     """
-    steps = round(hold / loop.timestep)
+    steps = round(trial.hold / loop.timestep)
     unit = fed_back_noise(loop, stream(seed, "length_noise"), np.ones(len(states)), steps)
 
     def recovers(amplitudes: Array) -> npt.NDArray[np.bool_]:
         run = loop.run(states, offset=amplitudes[:, None, None] * unit)
         after = np.where(run.alive[:, None], run.states, np.nan)
-        return survey(loop, target, after, duration=recovery, threshold=threshold).recovered
+        return _recovered(loop, target, after, trial)
 
-    return largest_tolerated(recovers, len(states), low, high, ratio=ratio)
+    return largest_tolerated(recovers, len(states), *NOISES, ratio=trial.ratio)
+
+
+def _recovered(
+    loop: ClosedLoop, target: Target, states: Array, trial: Trial
+) -> npt.NDArray[np.bool_]:
+    found = survey(loop, target, states, duration=trial.recovery, threshold=trial.threshold)
+    return found.recovered

@@ -183,13 +183,5 @@ def _population(bodies: list[Body], **options: object) -> Population:
 
 
 def _twin_work(population: Population, steps: int, *, lengths: bool = True) -> Work:
-    drive = check_drive(
-        population.bodies[0],
-        steps=steps,
-        inputs=None,
-        offset=None,
-        gate=None,
-        forces=None,
-        closed=True,
-    )
+    drive = check_drive(population.bodies[0], steps=steps, closed=True)
     return lambda: population.run(drive, 0, steps, lengths=lengths)

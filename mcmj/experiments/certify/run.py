@@ -2,7 +2,7 @@
 
 import os
 from dataclasses import dataclass
-from typing import Any
+from typing import NamedTuple
 
 import numpy as np
 from threadpoolctl import threadpool_limits
@@ -21,7 +21,7 @@ from mcmj.analysis.stability.floquet import Complex, Floquet, floquet, target_mu
 from mcmj.analysis.stability.loop import ClosedLoop
 from mcmj.analysis.stability.lyapunov import Exponent, lyapunov_exponent
 from mcmj.analysis.stability.phase import Diffusion, phase_diffusion
-from mcmj.analysis.stability.tolerance import Tolerance, force_tolerance, noise_tolerance
+from mcmj.analysis.stability.tolerance import Tolerance, Trial, force_tolerance, noise_tolerance
 from mcmj.core.body import Body
 from mcmj.experiments.certify.config import Config
 from mcmj.experiments.limit_cycle import run as limit_cycle
@@ -120,18 +120,27 @@ def run(config: Config, *, on_steps: OnSteps = lambda steps: None) -> Result:
     """
     goal = target(config.task)
     with threadpool_limits(1, "blas"):
-        loop, start, outputs, errors = _trained(config, goal)
-        if errors["orbit_error"] >= config.threshold:
+        trained = _trained(config, goal)
+        error = trained.errors["orbit_error"]
+        if error >= config.threshold:
             raise McmjError(
-                f"the free run is off the orbit by {100 * errors['orbit_error']:.3g} % "
+                f"the free run is off the orbit by {100 * error:.3g} % "
                 f"(threshold {100 * config.threshold:g} %): nothing to certify"
             )
         on_steps(1)
-        return _certified(config, goal, loop, start, outputs, errors, on_steps)
+        return _certified(config, goal, trained, on_steps)
 
 
-def _trained(config: Config, goal: Target) -> tuple[ClosedLoop, Array, Array, dict[str, float]]:
+class _Trained(NamedTuple):
     """The loop, a state on the cycle, and the last window of a free run in MuJoCo."""
+
+    loop: ClosedLoop
+    start: Array
+    outputs: Array
+    errors: dict[str, float]
+
+
+def _trained(config: Config, goal: Target) -> _Trained:
     body, readouts, _ = limit_cycle.get_body(config.of_body)
     simulation, w_out = Simulation(body), readouts.get(config.task)
     if w_out is None:
@@ -148,21 +157,14 @@ def _trained(config: Config, goal: Target) -> tuple[ClosedLoop, Array, Array, di
         "amplitude_error": orbits.relative_amplitude_error(outputs, goal),
     }
     loop = ClosedLoop(body, w_out, simulation.timestep, threads=os.cpu_count() or 1)
-    return loop, loop.vector(simulation.state), outputs, errors
+    return _Trained(loop, loop.vector(simulation.state), outputs, errors)
 
 
-def _certified(
-    config: Config,
-    goal: Target,
-    loop: ClosedLoop,
-    start: Array,
-    outputs: Array,
-    errors: dict[str, float],
-    on_steps: OnSteps,
-) -> Result:
+def _certified(config: Config, goal: Target, trained: _Trained, on_steps: OnSteps) -> Result:
     seed, copies = config.noise_seed, config.copies
-    how: dict[str, Any] = {"threshold": config.threshold, "recovery": config.recovery, "seed": seed}
-    cycle = _cycle(config, goal, loop, start)
+    trial = Trial(recovery=config.recovery, threshold=config.threshold)
+    loop = trained.loop
+    cycle = _cycle(config, goal, loop, trained.start)
     analysis = floquet(loop, cycle)
     confirmed = monodromy_error(loop, cycle, analysis)
     on_steps(1)
@@ -188,13 +190,13 @@ def _certified(
     pushes, agrees = _pushes(config, goal, loop, cycle)
     on_steps(1)
     states = on_cycle(loop, cycle, copies)
-    force = force_tolerance(loop, goal, states, **how)
-    fine = force_tolerance(loop, goal, states, refine=config.refine, **how)
+    force = force_tolerance(loop, goal, states, trial, seed=seed)
+    fine = force_tolerance(loop, goal, states, trial, refine=config.refine, seed=seed)
     on_steps(1)
-    noise = noise_tolerance(loop, goal, states, **how)
+    noise = noise_tolerance(loop, goal, states, trial, seed=seed)
     on_steps(1)
     return Result(
-        config, loop.body, goal, cycle, errors, outputs, analysis,
+        config, loop.body, goal, cycle, trained.errors, trained.outputs, analysis,
         None if goal.rhs is None else target_multipliers(goal), confirmed, exponent, diffusion,
         starts, loop.outputs(begun), rest_recovers, kicks, pushes, agrees, force, fine, noise,
     )  # fmt: skip
@@ -239,10 +241,8 @@ def _pushes(
     states = states[order]  # every strength at phases all over the cycle
     result = _survey(config, loop, goal, pushed(loop, states, forces, 1.0, refine=config.refine))
     some = slice(None, None, copies)
-    agreement = verdicts(
-        loop, goal, states[some], forces[some], 1.0, config.recovery, config.threshold
-    )
-    return result, agreement
+    trial = Trial(1.0, config.recovery, config.threshold)
+    return result, verdicts(loop, goal, states[some], forces[some], trial)
 
 
 def _pairs(values: Complex) -> list[list[float]]:

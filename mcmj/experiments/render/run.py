@@ -1,6 +1,6 @@
 """A film of a body at work: run it, disturbed or not, or read a trajectory file."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -133,7 +133,7 @@ def _film_of_file(config: Config, path: Path) -> Film:
     if outputs is None:
         outputs = np.zeros((len(trajectory), body.n_outputs))
     wanted = None if config.task is None else named_target(config.task)
-    return _film(config, body, trajectory, outputs, np.zeros(body.n_nodes), wanted, ())
+    return _film(config, body, trajectory, outputs, np.zeros(body.n_nodes), wanted)
 
 
 def _find(config: Config, stored: StoredBody) -> tuple[Array | None, Target | None]:
@@ -170,7 +170,7 @@ def _film_of_run(
 
     if not config.disturbance:
         run = advance([Phase(config.duration)])
-        return _film(config, body, run.trajectory, run.feedback, np.zeros_like(pushes), wanted, ())
+        return _film(config, body, run.trajectory, run.feedback, np.zeros_like(pushes), wanted)
     before = advance([Phase(config.before)])
     start = simulation.time
     simulation.set_state(velocities=simulation.state.velocities + kick)
@@ -184,12 +184,13 @@ def _film_of_run(
     pushed[len(before.feedback) :][rest.phase(0)] = pushes
     feedback = np.concatenate([before.feedback, rest.feedback])
     window = Window(start, start + config.during, config.disturbance)
-    return _film(config, body, trajectory, feedback, pushed, wanted, (window,))
+    film = _film(config, body, trajectory, feedback, pushed, wanted)
+    return replace(film, windows=(window,))
 
 
 def _film(
     config: Config, body: Body, trajectory: Trajectory, outputs: Array, pushes: Array,
-    wanted: Target | None, windows: tuple[Window, ...],
+    wanted: Target | None,
 ) -> Film:  # fmt: skip
     """Arrows show what feeds back and what pushes from outside, (N,) or (T, N) [N]."""
     forces = outputs @ body.w_fb.T + pushes
@@ -200,6 +201,5 @@ def _film(
         outputs=outputs,
         forces=np.where(body.fixed, 0.0, forces),
         orbit=None if wanted is None else wanted.orbit(ORBIT_POINTS),
-        windows=windows,
         deformation=config.deformation,
     )

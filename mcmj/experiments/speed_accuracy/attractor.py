@@ -1,7 +1,5 @@
 """What the integrator does to the learned attractor: taught under one, run under another."""
 
-from collections.abc import Sequence
-
 from mcmj.core.body import Body
 from mcmj.core.integrators import TWINNED
 from mcmj.learning.lessons import Teaching
@@ -10,35 +8,29 @@ from mcmj.metrics.orbits import orbit_error
 from mcmj.simulation.simulation import Simulation
 from mcmj.targets.limit_cycles import TARGETS, target
 
+FREE_RUN = 60.0  # s
+WINDOW = 20.0  # s: its last part, which counts
 
-def attractor_errors(
-    body: Body,
-    *,
-    seed: int,
-    integrators: Sequence[str] = tuple(TWINNED),
-    free_run: float = 60.0,
-    window: float = 20.0,
-    teaching: Teaching | None = None,
-    engine: str = "twin",
-) -> dict[str, dict[str, float]]:
+
+def attractor_errors(body: Body, *, seed: int) -> dict[str, dict[str, float]]:
     """Orbit errors [task]["A_to_B"] of readouts taught under integrator A and run under B.
 
-    Each run starts from clean teacher forcing under B; the error is that of the last `window`
+    Each run starts from clean teacher forcing under B; the error is that of the last WINDOW
     seconds of a free run. The twin agrees with MuJoCo to rounding and is tens of times faster.
     """
-    teaching = teaching or Teaching()
+    teaching = Teaching()
     table: dict[str, dict[str, float]] = {}
     for name in TARGETS:
         goal = target(name)
         table[name] = {}
-        for taught in integrators:
-            teacher = Simulation(body, integrator=taught, engine=engine)
+        for taught in TWINNED:
+            teacher = Simulation(body, integrator=taught, engine="twin")
             fit = teach(teacher, goal, teaching, seed)
-            for run in integrators:
-                simulation = Simulation(body, integrator=run, engine=engine)
+            for run in TWINNED:
+                simulation = Simulation(body, integrator=run, engine="twin")
                 synchronise(simulation, goal, teaching.washout)
                 simulation.set_readout(fit.w_out)
-                total, last = (round(s / simulation.timestep) for s in (free_run, window))
+                total, last = (round(s / simulation.timestep) for s in (FREE_RUN, WINDOW))
                 outputs = simulation.rollout(total, record=("outputs",)).get("outputs")
                 table[name][f"{taught}_to_{run}"] = orbit_error(outputs[-last:], goal)
     return table

@@ -56,9 +56,7 @@ def stepping(body: Body, method: str, steps: int) -> Work:
         simulation = _simulation(body, name, SHORT_STEP)
         return lambda: simulation.rollout(steps, record=())
     population = Population([body], [None], method=name, timestep=SHORT_STEP)
-    drive = check_drive(
-        body, steps=steps, inputs=None, offset=None, gate=None, forces=None, closed=False
-    )
+    drive = check_drive(body, steps=steps, closed=False)
     return lambda: population.run(drive, 0, steps, lengths=False)
 
 

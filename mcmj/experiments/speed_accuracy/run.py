@@ -7,6 +7,7 @@ second, as microseconds and as a ratio to MuJoCo's Euler at 1 ms, measured in tu
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -205,7 +206,8 @@ def _run_body(config: Config, body: Body) -> tuple[dict[str, dict[float, Cell]],
     for method in config.methods:
         cells[method] = {}
         for step_ms in config.steps_ms:
-            errors, length_error = _errors(config, body, method, step_ms, start, forces, goals)
+            end_after = partial(final_state, body, method, step_ms, start=start, forces=forces)
+            errors, length_error = _errors(config, body, step_ms, end_after, goals)
             per_second = 1e3 / step_ms  # steps
             cells[method][step_ms] = Cell(
                 position_errors=errors,
@@ -239,19 +241,16 @@ def _reference(body: Body, start: State, forces: Array, horizon: float, rtol: fl
 def _errors(
     config: Config,
     body: Body,
-    method: str,
     step_ms: float,
-    start: State,
-    forces: Array,
+    end_after: Callable[[int], State],
     goals: list[State],
 ) -> tuple[tuple[float, ...], float]:
     """Relative position errors at the horizons, and the length error at the last one."""
     errors = []
     length_error = np.inf
     for horizon, goal in zip(config.horizons, goals, strict=True):
-        steps = round(1e3 * horizon / step_ms)
         try:
-            end = final_state(body, method, step_ms, steps, start, forces)
+            end = end_after(round(1e3 * horizon / step_ms))
         except DivergenceError:
             errors.append(np.inf)
             continue

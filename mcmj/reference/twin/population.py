@@ -25,7 +25,7 @@ from mcmj.utils.validation import Array, require_count, require_number
 
 
 class Population:
-    """Bodies under a compiled twin; their states carry over from run to run.
+    """Bodies under a compiled twin, at first at rest; their states carry over from run to run.
 
     A body's bits depend neither on the other bodies nor on the number of threads. Bodies of
     one topology may be packed four to a vector register, which is faster and may differ from
@@ -36,7 +36,6 @@ class Population:
         readouts: one each, in any form that Readout.of takes; None: none.
         method: one of METHODS.
         timestep: control and integration step [s].
-        states: where to start; default: at rest.
         threads: number of threads.
         packed: pack them; all must have one topology.
 
@@ -51,7 +50,6 @@ class Population:
         *,
         method: str,
         timestep: float = 1e-3,
-        states: Sequence[State] | None = None,
         threads: int = 1,
         packed: bool = False,
     ) -> None:
@@ -65,7 +63,7 @@ class Population:
         self.method, self.timestep, self.threads = method, timestep, threads
         self._packed = packed
         self.steps_done = 0
-        self.set_states([rest(body) for body in bodies] if states is None else states)
+        self.set_states([rest(body) for body in bodies])
         self.set_readouts(readouts)
 
     def set_readouts(self, readouts: Sequence[object]) -> None:

@@ -18,12 +18,12 @@ from mcmj.core.callbacks.spring_laws import SpringLaw
 from mcmj.core.integrators import DEFAULT_INTEGRATOR, INTEGRATORS, Integrator, integrator_named
 from mcmj.core.options import Options
 from mcmj.simulation.stepsize.eigenvalues import RK4_REACH, limit_of, stable_at
-from mcmj.simulation.stepsize.linearisation import Linearised, linear_system, linearise, slopes
+from mcmj.simulation.stepsize.linearisation import Linearised, Motion, linear_system, slopes
 from mcmj.simulation.stepsize.schemes import BY_NAME
 from mcmj.utils.errors import StabilityWarning
 from mcmj.utils.validation import Array, require_number
 
-__all__ = ["Advice", "linearise", "recommend", "stability_limit", "warn_if_unstable"]
+__all__ = ["Advice", "recommend", "stability_limit", "warn_if_unstable"]
 
 SAFETY = 0.9  # a recommended step over the limit
 CHEAPEST_FIRST = sorted(
@@ -61,9 +61,7 @@ def stability_limit(
     speed: object = 0.0,
     elongation: object = 0.0,
     secant: bool = False,
-    positions: object = None,
     w_out: object = None,
-    gate: object = 1.0,
     springs: str | SpringLaw = "native",
 ) -> float:
     """Largest stable step [s]; infinity if every step is stable.
@@ -77,22 +75,14 @@ def stability_limit(
         speed, elongation: largest spring rate [m/s] and elongation [m] expected; numbers or (L,).
         secant: where motions of that size grow, and not small errors on top of them: a longer
             step, at which a run may survive as noise.
-        positions, w_out, gate, springs: as for `linearise`.
+        w_out, springs: as for `linear_system`.
 
     Raises:
         InvalidArgumentError, UnknownNameError: an argument out of bounds.
     """
     integrator_named(integrator, BY_NAME)
-    system = linear_system(
-        body,
-        positions,
-        elongation=elongation,
-        speed=speed,
-        secant=secant,
-        w_out=w_out,
-        gate=gate,
-        springs=springs,
-    )
+    motion = Motion(elongation, speed, secant)
+    system = linear_system(body, motion=motion, w_out=w_out, springs=springs)
     return limit_of(system, integrator)
 
 
@@ -100,20 +90,15 @@ def recommend(
     body: Body,
     timestep: float,
     integrator: str = DEFAULT_INTEGRATOR,
-    *,
-    speed: object = 0.0,
-    elongation: object = 0.0,
-    springs: str | SpringLaw = "native",
 ) -> Advice:
-    """Substeps, or other integrators, with which a control step [s] is stable in open loop.
+    """Substeps, or other integrators, with which a step [s] is stable in open loop near rest.
 
     Raises:
         InvalidArgumentError, UnknownNameError: an argument out of bounds.
     """
     require_number("timestep", timestep, 0.0, open_low=True)
     integrator_named(integrator, BY_NAME)
-    system = linear_system(body, elongation=elongation, speed=speed, springs=springs)
-    return _advice(system, timestep, integrator)
+    return _advice(linear_system(body), timestep, integrator)
 
 
 def _advice(system: Linearised, timestep: float, integrator: str) -> Advice:

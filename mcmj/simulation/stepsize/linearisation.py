@@ -61,28 +61,51 @@ class Linearised:
         return self.material + self.geometric + self.feedback
 
 
+@dataclass(frozen=True)
+class Motion:
+    """How large the motions are; none: small ones.
+
+    Attributes:
+        elongation: largest |x1| expected on top of the configuration's [m], a number or (L,):
+            stiffness and tension grow to it.
+        speed: largest |x2| expected [m/s], a number or (L,).
+        secant: secants instead of tangents.
+    """
+
+    elongation: object = 0.0
+    speed: object = 0.0
+    secant: bool = False
+
+
+SMALL = Motion()
+
+
 def linearise(
+    body: Body, positions: object = None, *, w_out: object = None, gate: object = 1.0
+) -> tuple[csr_array, csr_array]:
+    """Stiffness K + G + F (n, n) [N/m] and damping D (n, n) [N s/m] of small motions.
+
+    Args and errors: as for `linear_system`.
+    """
+    system = linear_system(body, positions, w_out=w_out, gate=gate)
+    return system.stiffness, system.damping
+
+
+def linear_system(
     body: Body,
     positions: object = None,
-    rates: object = None,
     *,
-    elongation: object = 0.0,
-    speed: object = 0.0,
-    secant: bool = False,
+    motion: Motion = SMALL,
     w_out: object = None,
     gate: object = 1.0,
     springs: str | SpringLaw = "native",
-) -> tuple[csr_array, csr_array]:
-    """Stiffness K + G + F (n, n) [N/m] and damping D (n, n) [N s/m] of small motions.
+) -> Linearised:
+    """The matrices of the body about a configuration at rest.
 
     Args:
         body: the body.
         positions: (N, 2) where to linearise [m]; default: the start.
-        rates: (L,) spring rates x2 there [m/s]; default: 0.
-        elongation: largest |x1| expected on top of that [m], a number or (L,): stiffness and
-            tension grow to it.
-        speed: largest |x2| expected on top of that [m/s], a number or (L,).
-        secant: secants instead of tangents.
+        motion: the size of its motions.
         w_out: readout (L, n_outputs), or with a bias in the last row; None: open loop.
         gate: (n_outputs,) or a number: 1 closes the channels, 0 opens them.
         springs: "native", or a law as Simulation takes it.
@@ -90,50 +113,22 @@ def linearise(
     Raises:
         InvalidArgumentError, UnknownNameError: an argument out of bounds.
     """
-    system = linear_system(
-        body,
-        positions,
-        rates,
-        elongation=elongation,
-        speed=speed,
-        secant=secant,
-        w_out=w_out,
-        gate=gate,
-        springs=springs,
-    )
-    return system.stiffness, system.damping
-
-
-def linear_system(
-    body: Body,
-    positions: object = None,
-    rates: object = None,
-    *,
-    elongation: object = 0.0,
-    speed: object = 0.0,
-    secant: bool = False,
-    w_out: object = None,
-    gate: object = 1.0,
-    springs: str | SpringLaw = "native",
-) -> Linearised:
-    """`linearise`, with the parts apart and the masses."""
     start = body.positions if positions is None else positions
     where = as_array("positions", start, (body.n_nodes, 2))
-    x2 = np.zeros(body.n_springs) if rates is None else as_array("rates", rates, (body.n_springs,))
     tail, head = body.springs.T
     gap = where[head] - where[tail]
     lengths = np.maximum(np.linalg.norm(gap, axis=1), np.finfo(float).tiny)
     axis = gap / lengths[:, None]
     x1 = lengths - body.rest_lengths
-    further = _amplitudes("elongation", elongation, body)
+    further = _amplitudes("elongation", motion.elongation, body)
     widest = _away(x1, further)
-    fastest = _away(x2, _amplitudes("speed", speed, body))
+    fastest = _amplitudes("speed", motion.speed, body)
     p_tangent, q_tangent, tension = slopes(body, widest, fastest, springs)
     along = _spring_rows(body, axis)
     across = _spring_rows(body, np.stack([-axis[:, 1], axis[:, 0]], axis=1))
     tangent_material, tangent_damping = _assembled(along, p_tangent), _assembled(along, q_tangent)
     material, damping = tangent_material, tangent_damping
-    if secant:
+    if motion.secant:
         p_secant, q_secant, _ = slopes(body, widest, fastest, springs, secant=True)
         material, damping = _assembled(along, p_secant), _assembled(along, q_secant)
     return Linearised(
