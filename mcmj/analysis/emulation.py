@@ -29,14 +29,18 @@ Acceleration = Callable[[float, float], float]
 Accelerations = Callable[[Any, Any, Any], None]
 
 
-def emulation_body(masses: int = 1, *, k1=3.0, k3=150.0, d1=1.0, d3=150.0) -> Body:
+SPRING = 3.0, 150.0, 1.0, 150.0  # k1, k3, d1, d3 (SI)
+NAMES = "x1", "x2"  # of a scalar function's arguments
+
+
+def emulation_body(masses: int = 1) -> Body:
     """So many masses of 1 kg, each on its own nonlinear spring, side by side on one wall.
 
     Raises:
-        InvalidArgumentError: not at least one mass, or parameters out of bounds.
+        InvalidArgumentError: not at least one mass.
     """
     require_count("masses", masses, 1)
-    return parallel_body(*(np.full(masses, value) for value in (k1, k3, d1, d3)))
+    return parallel_body(*(np.full(masses, value) for value in SPRING))
 
 
 def static_feedback(name: str, g: Acceleration, *, mismatch: float = 0.0) -> SpringLaw:
@@ -115,23 +119,23 @@ def lift(
     return g
 
 
-def scalar_function(expression: str, names: Sequence[str] = ("x1", "x2")) -> Acceleration:
+def scalar_function(expression: str) -> Acceleration:
     """G(x1, x2) from its text, such as "-x1 + (1 - x1**2) * x2".
 
     Raises:
         InvalidArgumentError: not an expression in these names.
     """
-    symbols = sp.symbols(tuple(names))
+    symbols = sp.symbols(NAMES)
     try:
         parsed = sp.sympify(expression, locals={s.name: s for s in symbols})
         strange = parsed.free_symbols - set(symbols)
     except (sp.SympifyError, SyntaxError, TypeError, AttributeError) as error:
-        raise InvalidArgumentError("g", f"an expression in {', '.join(names)}", expression) from (
+        raise InvalidArgumentError("g", f"an expression in {', '.join(NAMES)}", expression) from (
             error
         )
     if strange:
         raise InvalidArgumentError(
-            "g", f"an expression in {', '.join(names)}", f"{expression!r}, with {strange}"
+            "g", f"an expression in {', '.join(NAMES)}", f"{expression!r}, with {strange}"
         )
     return sp.lambdify(symbols, sp.Float(1.0) * parsed, modules="math")
 

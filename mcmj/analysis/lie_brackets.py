@@ -25,6 +25,8 @@ from mcmj.utils.validation import require_count
 
 Point = dict[sp.Symbol, sp.Expr]
 
+LONGEST = 100  # letters of an expression that a message shows
+
 
 @dataclass(frozen=True)
 class ControlSystem:
@@ -192,9 +194,9 @@ def _rank(matrix: sp.Matrix) -> int:
     return DomainMatrix.from_Matrix(matrix).to_field().rank()
 
 
-def _shortened(expression: object, longest: int = 100) -> str:
+def _shortened(expression: object) -> str:
     text = str(expression)
-    return text if len(text) <= longest else f"{text[:longest]} ..."
+    return text if len(text) <= LONGEST else f"{text[:LONGEST]} ..."
 
 
 # --- the systems of the paper ------------------------------------------------------------------

@@ -95,7 +95,7 @@ def parallel_body(k1: Array, k3: Array, d1: Array, d3: Array, *, masses: float =
 
 
 def diverse_array(
-    masses: int, diversity: float, *, stiffness: float, damping: float, mass: float = 1.0
+    masses: int, diversity: float, *, stiffness: float, damping: float
 ) -> LinearArray:
     """Stiffnesses spread evenly in log k over stiffness x exp(+-diversity); equal dampings.
 
@@ -107,7 +107,7 @@ def diverse_array(
     for name, value in (("stiffness", stiffness), ("damping", damping)):
         require_number(name, value, 0.0, open_low=True)
     spread = np.linspace(-1.0, 1.0, masses) if masses > 1 else np.zeros(1)
-    return LinearArray(stiffness * np.exp(diversity * spread), np.full(masses, damping), mass)
+    return LinearArray(stiffness * np.exp(diversity * spread), np.full(masses, damping))
 
 
 def numerical_rank(matrix: Array) -> int:

@@ -70,9 +70,7 @@ class Capacities:
         return float(self.values[self.terms.index(term)])
 
 
-def memory_capacity(
-    states: Array, inputs: Array, max_delay: int, *, p_value: float = P_VALUE
-) -> Capacities:
+def memory_capacity(states: Array, inputs: Array, max_delay: int) -> Capacities:
     """Linear memory: the capacities for u_(k-i), i = 0 .. max_delay.
 
         MC = sum_i cov(u_(k-i), y_k)^2 / (var u var y)   (Jaeger, GMD report 152, 2002, leaves
@@ -81,12 +79,11 @@ def memory_capacity(
     Args:
         states: (K, N).
         inputs: (K,) in [-1, 1], u_k what x_k has just seen.
-        p_value: see the module's text.
 
     Raises:
         InvalidArgumentError: wrong shapes, inputs beyond [-1, 1], or too few samples.
     """
-    return processing_capacity(states, inputs, [max_delay], p_value=p_value)
+    return processing_capacity(states, inputs, [max_delay])
 
 
 def processing_capacity(
@@ -98,7 +95,8 @@ def processing_capacity(
     d = 1, 2, ..., which are orthogonal for uniform inputs.
 
     Args:
-        states, inputs, p_value: as for `memory_capacity`.
+        states, inputs: as for `memory_capacity`.
+        p_value: see the module's text.
         max_delays: the largest delay looked at, for degree 1, 2, ...
 
     Raises:

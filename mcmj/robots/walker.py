@@ -134,11 +134,11 @@ class Walker:
         self._batch.bind("qpos")[:, self._nodes :] = start
         self._batch.bind("qvel")[:, self._nodes :] = 0.0
 
-    def body_state(self, copy: int = 0) -> State:
-        """Positions and velocities of a copy's body, in the units it was taught in."""
+    def body_state(self) -> State:
+        """Positions and velocities of the first robot's body, in the units it was taught in."""
         positions, velocities = self.taught.positions.copy(), np.zeros((self.taught.n_nodes, 2))
         moved, speed = (
-            self._batch.bind(name)[copy, : self._nodes].reshape(-1, 2) for name in ("qpos", "qvel")
+            self._batch.bind(name)[0, : self._nodes].reshape(-1, 2) for name in ("qpos", "qvel")
         )
         positions[self.taught.free] += moved / SIZE
         velocities[self.taught.free] = speed / (SIZE * self.pace)

@@ -18,6 +18,7 @@ from mcmj.utils.validation import require_count
 
 T = TypeVar("T")
 _ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
+PATIENCE = 5.0  # s for a scheduler to answer
 
 
 class Workers(Protocol):
@@ -141,7 +142,7 @@ class Cluster:
         self._client.close()
 
 
-def _check_answers(scheduler: str, *, patience: float = 5.0) -> None:
+def _check_answers(scheduler: str) -> None:
     """Dask itself waits for long, and says little, where nobody listens."""
     expected = "the address of a Dask scheduler, as in tcp://host:8786"
     match = re.fullmatch(r"(?:([a-z]+)://)?\[?([^/\[\]]+)\]?:(\d{1,5})", scheduler)
@@ -150,7 +151,7 @@ def _check_answers(scheduler: str, *, patience: float = 5.0) -> None:
     if match[1] not in (None, "tcp", "tls"):
         return
     try:
-        socket.create_connection((match[2], int(match[3])), timeout=patience).close()
+        socket.create_connection((match[2], int(match[3])), timeout=PATIENCE).close()
     except (OSError, OverflowError, UnicodeError) as error:
         raise InvalidArgumentError("scheduler", expected, f"{scheduler}: {error}") from error
 

@@ -25,7 +25,6 @@ class LiveLoop:
     Args:
         readouts: by name, (L or L + 1, n_outputs) each.
         start: positions, velocities and time to start from; None: total rest.
-        timestep: [s].
 
     Raises:
         InvalidArgumentError: no readout, or one that does not fit.
@@ -37,18 +36,18 @@ class LiveLoop:
         readouts: Mapping[str, Array],
         *,
         start: State | None = None,
-        timestep: float = 1e-3,
     ) -> None:
         if not readouts:
             raise InvalidArgumentError("readouts", "at least one", "none")
-        self.body, self.timestep, self._start = body, timestep, start
+        self.body, self._start = body, start
         self._readouts = {
             name: Readout.of(value, body.n_springs, body.n_outputs, name)
             for name, value in readouts.items()
         }
         install.install()
         room = np.zeros((body.n_springs + 1, body.n_outputs))
-        self._model = load_model(to_mjcf(body, timestep=timestep, w_out=room))
+        self._model = load_model(to_mjcf(body, w_out=room))
+        self.timestep = float(self._model.opt.timestep)
         self._data = mujoco.MjData(self._model)
         self._feedback = slice(body.n_inputs, body.n_inputs + body.n_outputs)
         self._bodies = np.array([self._model.body(f"n{i}").id for i in body.free])

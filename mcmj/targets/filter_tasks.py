@@ -51,13 +51,13 @@ def smooth_noise(
     return smooth / smooth.std()
 
 
-def gaussian_kernel(timestep: float, mu: float = 0.1, sigma: float = 0.05) -> Array:
-    """h(tau) = exp(-(tau - mu)^2 / 2 sigma^2) at 0 <= tau < 0.2 s, times sqrt(timestep).
+def gaussian_kernel(timestep: float) -> Array:
+    """h(tau) = exp(-(tau - 0.1 s)^2 / 2 (0.05 s)^2) at 0 <= tau < 0.2 s, times sqrt(timestep).
 
     Its square is the toolbox's two-dimensional kernel: a sum over both arguments.
     """
     taus = np.arange(round(SUPPORT / timestep)) * timestep
-    return np.sqrt(timestep) * np.exp(-((taus - mu) ** 2) / (2 * sigma**2))
+    return np.sqrt(timestep) * np.exp(-((taus - 0.1) ** 2) / (2 * 0.05**2))
 
 
 def volterra(steps: int, timestep: float = 1e-3) -> FilterTask:

@@ -53,12 +53,11 @@ def require_above(name: str, array: Array, low: float, *, strict: bool = True) -
         )
 
 
-def require_range(name: str, value: Sequence[float], *, positive: bool = True) -> None:
-    """Raise unless `value` is (low, high) with low <= high, and low > 0 if positive."""
+def require_range(name: str, value: Sequence[float]) -> None:
+    """Raise unless `value` is (low, high) with 0 < low <= high."""
     low, high = as_array(name, value, (2,))
-    if low > high or (positive and low <= 0):
-        kind = "0 < low <= high" if positive else "low <= high"
-        raise InvalidArgumentError(name, f"(low, high) with {kind}", tuple(value))
+    if not 0 < low <= high:
+        raise InvalidArgumentError(name, "(low, high) with 0 < low <= high", tuple(value))
 
 
 def require_number(

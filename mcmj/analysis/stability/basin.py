@@ -81,19 +81,17 @@ def survey(
     states: Array,
     *,
     duration: float,
-    window: float | None = None,
     threshold: float = 0.05,
 ) -> Survey:
     """Let copies (B, n) run free and see which come to the target's orbit, and when.
 
     Args:
-        duration: of the free runs [s].
-        window: last part of it that must be on the orbit [s]; default: two periods.
+        duration: of the free runs [s]; their last two periods must be on the orbit.
 
     Raises:
-        InvalidArgumentError: a duration shorter than the window.
+        InvalidArgumentError: a duration shorter than that.
     """
-    window = 2 * target.period if window is None else window
+    window = 2 * target.period
     require_number("duration", duration, window)
     steps = round(duration / loop.timestep)
     runs = []

@@ -17,6 +17,8 @@ from mcmj.utils.errors import McmjError
 from mcmj.utils.validation import Array, require_number
 
 _NODES = np.arange(-1.0, 3.0)  # steps around the moment, relative to the one before it
+TOLERANCE = 1e-7  # largest residual of a cycle
+SAMPLES = 64  # of a cycle, for its size
 
 
 @dataclass(frozen=True)
@@ -70,7 +72,6 @@ def find_cycle(
     guess: float,
     *,
     settle: float = 100.0,
-    tolerance: float = 1e-7,
     rounds: int = 10,
 ) -> Cycle:
     """The cycle that a state (n,) runs into.
@@ -78,7 +79,6 @@ def find_cycle(
     Args:
         guess: expected period [s], right within 20 %.
         settle: let transients die for so long [s] before each attempt.
-        tolerance: largest residual.
         rounds: attempts.
 
     Raises:
@@ -90,7 +90,7 @@ def find_cycle(
     for _ in range(rounds):
         state = loop.advance(state, max(1, round(settle / loop.timestep)))
         cycle = _cycle_at(loop, state, guess)
-        if cycle.residual <= tolerance:
+        if cycle.residual <= TOLERANCE:
             return cycle
     raise McmjError(
         f"no settled cycle after {rounds * settle:g} s: the state misses itself by "
@@ -124,9 +124,9 @@ def _cycle_at(loop: ClosedLoop, state: Array, guess: float) -> Cycle:
     return Cycle(here, tangent, period, scale, residual)
 
 
-def _scale(loop: ClosedLoop, state: Array, steps: int, samples: int = 64) -> Array:
+def _scale(loop: ClosedLoop, state: Array, steps: int) -> Array:
     """RMS excursion and speed, each repeated for its half of the coordinates."""
-    states = loop.trail(state[0], steps // samples, samples)
+    states = loop.trail(state[0], steps // SAMPLES, SAMPLES)
     half = loop.size // 2
     excursion = float(np.sqrt(states[:, :half].var(axis=0).mean()))
     speed = float(np.sqrt((states[:, half:] ** 2).mean()))

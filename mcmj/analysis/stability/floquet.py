@@ -87,13 +87,13 @@ def multipliers(monodromy: Array) -> tuple[Complex, Complex]:
     return values[order], vectors[:, order]
 
 
-def floquet(loop: ClosedLoop, cycle: Cycle, eps: float = DIFFERENCE) -> Floquet:
+def floquet(loop: ClosedLoop, cycle: Cycle) -> Floquet:
     """Multipliers of a cycle by differences in the twin and by the linearised step map.
 
     Raises:
         DivergenceError: a copy blew up.
     """
-    monodromy = differences(loop, cycle, eps)
+    monodromy = differences(loop, cycle)
     values, vectors = multipliers(monodromy)
     _, exact = variational(loop, cycle.state, cycle.period)
     other = _matched(multipliers(exact)[0], values)
@@ -132,14 +132,14 @@ def target_multipliers(target: Target) -> Complex:
     return multipliers(solution.y[n:, -1].reshape(n, n))[0]
 
 
-def jacobian(rhs: Callable[[float, Array], Array], x: Array, step: float = 1e-4) -> Array:
+def jacobian(rhs: Callable[[float, Array], Array], x: Array) -> Array:
     """f'(x) (n, n) by central differences of fourth order: exact for cubic polynomials."""
 
     def slope(width: float) -> Array:
         rows = [(rhs(0.0, x + e) - rhs(0.0, x - e)) / (2 * width) for e in width * np.eye(len(x))]
         return np.array(rows).T
 
-    return (4 * slope(step) - slope(2 * step)) / 3
+    return (4 * slope(DIFFERENCE) - slope(2 * DIFFERENCE)) / 3
 
 
 def _matched(values: Complex, to: Complex) -> Complex:

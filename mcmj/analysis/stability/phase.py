@@ -17,6 +17,7 @@ from mcmj.utils.seeds import stream
 from mcmj.utils.validation import Array, require_count, require_number
 
 BATCH = 32  # copies at a time: 16 MB of noise at 6 s
+POINTS = 512  # of a cycle, among which the nearest is found
 
 
 @dataclass(frozen=True)
@@ -103,8 +104,8 @@ class _Phases:
     """Phases (B,) [s] of states (B, n): the nearest of many states of the cycle, then the foot
     of the perpendicular on the tangent there."""
 
-    def __init__(self, loop: ClosedLoop, cycle: Cycle, points: int = 512) -> None:
-        stride = max(1, round(cycle.period / loop.timestep / points))
+    def __init__(self, loop: ClosedLoop, cycle: Cycle) -> None:
+        stride = max(1, round(cycle.period / loop.timestep / POINTS))
         count = int(cycle.period / loop.timestep / stride)
         self._scale, self._spacing = cycle.scale, stride * loop.timestep
         trail = loop.trail(cycle.state, stride, count + 2) / cycle.scale

@@ -8,19 +8,16 @@ from mcmj.simulation.simulation import Simulation
 from mcmj.utils.timing import interleaved_seconds, median_ratio
 from mcmj.utils.validation import Array
 
+STEPS = 4000
+REPEATS = 7
+
 
 def closed_loop_cost(
-    body: Body,
-    w_out: Array,
-    *,
-    timestep: float,
-    integrator: str,
-    steps: int = 4000,
-    repeats: int = 7,
+    body: Body, w_out: Array, *, timestep: float, integrator: str
 ) -> tuple[float, float]:
     """Steps a second in closed loop with lengths and outputs recorded, and its cost ratio.
 
-    The ratio is the median over `repeats` of the time for `steps` control steps through
+    The ratio is the median over REPEATS of the time for STEPS control steps through
     Simulation.rollout, over the time of as many bare mj_step of the same model from the same
     state with the loop open, measured in turns.
     """
@@ -31,10 +28,10 @@ def closed_loop_cost(
         state = simulation.state
         bare.qpos[:] = (state.positions - body.positions)[free].ravel()
         bare.qvel[:] = state.velocities[free].ravel()
-        mujoco.mj_step(simulation.model, bare, nstep=steps)
+        mujoco.mj_step(simulation.model, bare, nstep=STEPS)
 
     seconds = interleaved_seconds(
-        {"closed": lambda: simulation.rollout(steps), "bare": step_bare}, repeats
+        {"closed": lambda: simulation.rollout(STEPS), "bare": step_bare}, REPEATS
     )
-    speed = steps / float(np.median(seconds["closed"]))
+    speed = STEPS / float(np.median(seconds["closed"]))
     return speed, median_ratio(seconds, "closed", "bare")

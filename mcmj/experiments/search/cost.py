@@ -29,15 +29,15 @@ def bare_seconds(trials: Sequence[Trial]) -> float:
     return time.perf_counter() - begin
 
 
-def overhead(trials: Sequence[Trial], workers: Workers, *, repeats: int = REPEATS) -> float:
-    """Median over repeats of (workers x time of the search) / (time of bare runs) - 1.
+def overhead(trials: Sequence[Trial], workers: Workers) -> float:
+    """Median over REPEATS of (workers x time of the search) / (time of bare runs) - 1.
 
     Both run the same trials in turns on the same workers, the bare runs in one loop a worker;
     the search on an empty store, with all that it does for a trial.
     """
     shares = [trials[k :: workers.count] for k in range(workers.count)]
     ratios = []
-    for _ in range(repeats):
+    for _ in range(REPEATS):
         bare = results(workers, bare_seconds, [(share,) for share in shares if share])
         with (
             tempfile.TemporaryDirectory() as folder,

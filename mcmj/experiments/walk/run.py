@@ -22,6 +22,9 @@ from mcmj.utils.seeds import stream
 from mcmj.utils.threads import in_threads
 from mcmj.utils.timing import interleaved_seconds, median_ratio
 
+COST_STEPS = 4000
+COST_REPEATS = 7
+
 
 @dataclass(frozen=True)
 class Result:
@@ -165,19 +168,19 @@ def step_study(lesson: Lesson, name: str, on_steps: OnSteps = lambda steps: None
     return table
 
 
-def step_cost(lesson: Lesson, *, steps: int = 4000, repeats: int = 7) -> Table:
+def step_cost(lesson: Lesson) -> Table:
     """Time of a step of the whole scene over that of the planar body alone, in turns."""
     name = lesson.config.gaits[0]
     walker = lesson.walker()
     walker.start(lesson.gaits[name])
     planar = Simulation(lesson.body, w_out=lesson.gaits[name].swing)
     works = {
-        "scene": lambda: walker.advance(steps),
-        "planar": lambda: planar.rollout(steps, record=()),
+        "scene": lambda: walker.advance(COST_STEPS),
+        "planar": lambda: planar.rollout(COST_STEPS, record=()),
     }
-    seconds = interleaved_seconds(works, repeats)
+    seconds = interleaved_seconds(works, COST_REPEATS)
     return {
-        "scene_us_per_step": 1e6 * float(np.median(seconds["scene"])) / steps,
-        "planar_us_per_step": 1e6 * float(np.median(seconds["planar"])) / steps,
+        "scene_us_per_step": 1e6 * float(np.median(seconds["scene"])) / COST_STEPS,
+        "planar_us_per_step": 1e6 * float(np.median(seconds["planar"])) / COST_STEPS,
         "ratio": median_ratio(seconds, "scene", "planar"),
     }
