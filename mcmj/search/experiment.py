@@ -30,9 +30,11 @@ from threadpoolctl import threadpool_limits
 from mcmj.core.integrators import DEFAULT_INTEGRATOR
 from mcmj.core.random_body import draw_body
 from mcmj.metrics.metric_paths import matched, numbers_at, quantity
+from mcmj.metrics.orbits import ORBIT_POINTS
 from mcmj.mjcf.bundled import body_path
 from mcmj.mjcf.write import to_mjcf
 from mcmj.search.overrides import override
+from mcmj.targets.named import NAMES, named_target
 from mcmj.utils.errors import (
     DivergenceError,
     InvalidArgumentError,
@@ -102,12 +104,15 @@ class Trial:
     @functools.cached_property
     def inputs(self) -> str:
         """A hash of what the run reads besides: the code of an experiment of one's own (all of
-        its package), the config's body file, and files that it names as a Path."""
+        its package), the config's body file, files that it names as a Path, and its target."""
         digest = hashlib.sha256(_source_digest(self.experiment).encode())
         for name, value in vars(self.config).items():
             if isinstance(value, Path) or (name == "body" and isinstance(value, str)):
                 with suppress(McmjError, OSError):  # what cannot be read, the run refuses
                     digest.update(name.encode() + body_path(str(value)).read_bytes())
+            elif name == "task" and isinstance(value, str) and value not in NAMES:
+                with suppress(McmjError):
+                    digest.update(named_target(value).orbit(ORBIT_POINTS).tobytes())
         return digest.hexdigest()
 
 

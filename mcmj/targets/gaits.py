@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import expit
 
-from mcmj.targets.limit_cycles import TARGETS, Target, from_array, limit_cycle, target
+from mcmj.targets.limit_cycles import Target, from_array, limit_cycle
 from mcmj.utils.errors import UnknownNameError
 from mcmj.utils.validation import Array, as_array, require_number
 
@@ -107,7 +107,6 @@ GAITS: dict[str, Gait] = {
         ),
     )
 }  # fmt: skip
-NAMES = (*TARGETS, *GAITS)
 
 
 @functools.cache
@@ -120,14 +119,3 @@ def gait_target(name: str) -> Target:
     if name not in GAITS:
         raise UnknownNameError("gait", name, GAITS)
     return GAITS[name].target()
-
-
-def named_target(name: str) -> Target:
-    """A limit cycle of mcmj.targets or a gait: one of NAMES.
-
-    Raises:
-        UnknownNameError: neither.
-    """
-    if name not in NAMES:
-        raise UnknownNameError("target", name, NAMES)
-    return gait_target(name) if name in GAITS else target(name)

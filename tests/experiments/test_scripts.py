@@ -75,7 +75,7 @@ def test_a_body_file_with_its_readout_is_not_taught_again(limit_cycle, tmp_path)
 @pytest.mark.parametrize(
     ("options", "text"),
     [
-        (["--task", "waltz"], "unknown task 'waltz'; valid choices: all, lissajous"),
+        (["--task", "waltz"], "unknown task 'waltz'; valid choices: a path to a .csv file, all,"),
         (["--body", "nowhere.xml"], "no such body file: 'nowhere.xml'"),
         (["--body", "nobody"], "unknown body 'nobody'; valid choices:"),
         (["--k1", "-1", "2"], "k1: expected (low, high) with 0 < low <= high"),

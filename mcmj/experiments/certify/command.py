@@ -95,7 +95,7 @@ def plus_minus(diffusion: Diffusion) -> str:
 
 def show(result: Result, console: Console) -> None:
     """The result as tables."""
-    table = Table("", "", title=f"certificate: {result.config.task}")
+    table = Table("", "", title=f"certificate: {result.target.name}")
     for name, value in lines(result):
         table.add_row(name, value)
     console.print(table)

@@ -5,8 +5,7 @@ from dataclasses import dataclass, field
 from mcmj.experiments.limit_cycle import run as limit_cycle
 from mcmj.learning.lessons import Teaching
 from mcmj.metrics import orbits
-from mcmj.targets.limit_cycles import TARGETS, target
-from mcmj.utils.errors import UnknownNameError
+from mcmj.targets.named import named_target
 from mcmj.utils.validation import (
     as_array,
     require_above,
@@ -22,7 +21,7 @@ class Config:
     """What to certify.
 
     Attributes:
-        task: van_der_pol, quadratic or lissajous.
+        task: van_der_pol, .., a .csv file or package.module:function.
         body: a body file, or the name of a body that comes with mcmj; default: the general
             body. If the file holds a readout for the task, nothing is taught.
         seed: of all noise; with no body, of a new random body if given.
@@ -57,15 +56,13 @@ class Config:
     teaching: Teaching = field(default_factory=Teaching)
 
     def __post_init__(self) -> None:
-        if self.task not in TARGETS:
-            raise UnknownNameError("task", self.task, TARGETS)
+        period = named_target(self.task).period
         for name in ("threshold", "diffusion_noise"):
             require_number(name, getattr(self, name), 0.0, open_low=True)
         if self.seed is not None:
             require_seed("seed", self.seed)
         for name in ("free_run", "recovery"):
             require_duration(name, getattr(self, name))
-        period = target(self.task).period
         require_number("window", self.window, orbits.PERIODS_NEEDED * period, self.free_run)
         require_number("recovery", self.recovery, 3 * period)
         for name in ("scales", "kicks", "pushes"):

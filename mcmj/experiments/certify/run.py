@@ -29,7 +29,8 @@ from mcmj.learning.teaching import synchronise, teach
 from mcmj.metrics import orbits
 from mcmj.reference.twin.population import rest as rest_state
 from mcmj.simulation.simulation import Simulation
-from mcmj.targets.limit_cycles import Target, target
+from mcmj.targets.limit_cycles import Target
+from mcmj.targets.named import named_target, require_outputs
 from mcmj.utils.errors import McmjError
 from mcmj.utils.progress import OnSteps
 from mcmj.utils.seeds import stream
@@ -118,7 +119,7 @@ def run(config: Config, *, on_steps: OnSteps = lambda steps: None) -> Result:
         DivergenceError: the free run blew up.
         McmjError: the free run is not on the target's orbit: there is nothing to certify.
     """
-    goal = target(config.task)
+    goal = named_target(config.task)
     with threadpool_limits(1, "blas"):
         trained = _trained(config, goal)
         error = trained.errors["orbit_error"]
@@ -142,7 +143,8 @@ class _Trained(NamedTuple):
 
 def _trained(config: Config, goal: Target) -> _Trained:
     body, readouts, _ = limit_cycle.get_body(config.of_body)
-    simulation, w_out = Simulation(body), readouts.get(config.task)
+    require_outputs(body, goal)
+    simulation, w_out = Simulation(body), readouts.get(goal.name)
     if w_out is None:
         w_out = teach(simulation, goal, config.teaching, config.noise_seed).w_out
     else:

@@ -18,8 +18,8 @@ from mcmj.learning.lessons import Teaching
 from mcmj.learning.teaching import teach
 from mcmj.metrics import orbits
 from mcmj.simulation.simulation import Simulation
-from mcmj.targets.limit_cycles import TARGETS, Target, target
-from mcmj.utils.errors import UnknownNameError
+from mcmj.targets.limit_cycles import Target
+from mcmj.targets.named import named_target
 from mcmj.utils.progress import OnSteps
 from mcmj.utils.seeds import stream
 from mcmj.utils.validation import (
@@ -39,7 +39,8 @@ class Config:
     """What to learn.
 
     Attributes:
-        task: van_der_pol, quadratic or lissajous: taught to the body, then to be reached.
+        task: van_der_pol, .., a .csv file or package.module:function: taught to the body, then
+            to be reached.
         seed: of the random body, its teaching and the search.
         nodes: of the body.
         knots: of the input signal, one number each, linear in between and 0 after the last.
@@ -67,8 +68,7 @@ class Config:
     time_limit: float = 25.0
 
     def __post_init__(self) -> None:
-        if self.task not in TARGETS:
-            raise UnknownNameError("task", self.task, TARGETS)
+        named_target(self.task)
         require_count("knots", self.knots, 1)
         require_count("nodes", self.nodes, 3, MOST_NODES)
         require_seed("seed", self.seed)
@@ -85,7 +85,7 @@ class Config:
 
 @dataclass(frozen=True)
 class Episode:
-    """From total rest: times (K,) [s], inputs (K,), outputs (K, 2), rewards (K,) in [0, 1]."""
+    """From total rest: times (K,) [s], inputs (K,), outputs (K, n_outputs), rewards (K,)."""
 
     times: Array
     inputs: Array
@@ -142,8 +142,8 @@ def run(config: Config, *, on_steps: OnSteps = lambda steps: None) -> Result:
     """
     from mcmj.learning.environments.environment import make  # dm_control is an extra
 
-    wanted = target(config.task)
-    body = random_body(config.seed, config.nodes, n_inputs=1)
+    wanted = named_target(config.task)
+    body = random_body(config.seed, config.nodes, n_inputs=1, n_outputs=wanted.n_outputs)
     fit = teach(Simulation(body, engine="twin"), wanted, Teaching(), config.seed)
     setting = Setting(
         actions="inputs", input_limit=config.input_limit, kick=0.0,

@@ -10,7 +10,8 @@ from mcmj.learning.free_run import WINDOW
 from mcmj.learning.lessons import Teaching
 from mcmj.metrics import orbits
 from mcmj.mjcf.bundled import open_body
-from mcmj.targets.limit_cycles import TARGETS, Target, target
+from mcmj.targets.limit_cycles import TARGETS, Target
+from mcmj.targets.named import named_target, require_outputs
 from mcmj.utils.errors import InvalidArgumentError, UnknownNameError
 from mcmj.utils.validation import (
     Array,
@@ -28,7 +29,8 @@ class Config:
     """What to run.
 
     Attributes:
-        task: van_der_pol, quadratic, lissajous, or all three (by the same body).
+        task: van_der_pol, quadratic, lissajous, or all of these (by the same body); a gait; a .csv
+            file; package.module:function.
         body: a body file, or the name of a body that comes with mcmj; default: the general
             body, unless a seed or changed settings ask for a new random one. If the file
             holds a readout for the task, nothing is taught.
@@ -64,15 +66,13 @@ class Config:
     teaching: Teaching = field(default_factory=Teaching)
 
     def __post_init__(self) -> None:
-        if self.task not in (*TARGETS, "all"):
-            raise UnknownNameError("task", self.task, [*TARGETS, "all"])
+        longest = max(wanted.period for wanted in self.targets.values())
         require_count("seeds", self.seeds, 1)
         require_number("threshold", self.threshold, 0.0, open_low=True)
         require_timestep("timestep", self.timestep)
         require_duration("free_run", self.free_run, self.timestep)
         require_number("window", self.window, 0.0, self.free_run, open_low=True)
         if self.windows != 0.0:
-            longest = max(target(name).period for name in self.tasks)
             require_number("windows", self.windows, orbits.PERIODS_NEEDED * longest)
         if self.engine not in ENGINES:
             raise UnknownNameError("engine", self.engine, ENGINES)
@@ -88,9 +88,10 @@ class Config:
             raise InvalidArgumentError("body", "none beside seeds, which draw theirs", self.body)
 
     @property
-    def tasks(self) -> tuple[str, ...]:
-        """Names of the targets to learn."""
-        return tuple(TARGETS) if self.task == "all" else (self.task,)
+    def targets(self) -> dict[str, Target]:
+        """What to learn, by name."""
+        tasks = tuple(TARGETS) if self.task == "all" else (self.task,)
+        return {one.name: one for one in (named_target(task, "all") for task in tasks)}
 
     @property
     def noise_seed(self) -> int:
@@ -108,14 +109,14 @@ def get_body(config: Config) -> Found:
     stored.take(timestep=config.timestep, integrator=config.integrator)
     readouts = stored.readouts
     if not readouts and stored.w_out is not None and config.task != "all":
-        readouts = {config.task: stored.w_out}
+        readouts = dict.fromkeys(config.targets, stored.w_out)
     return stored.body, readouts, stored.provenance
 
 
 def total_steps(config: Config) -> int:
     """Control steps of a whole run, for a progress bar."""
     seconds = config.teaching.total + config.free_run
-    return config.seeds * len(config.tasks) * round(seconds / config.timestep)
+    return config.seeds * len(config.targets) * round(seconds / config.timestep)
 
 
 def check_task(config: Config, body: Body, wanted: Target) -> None:
@@ -124,10 +125,7 @@ def check_task(config: Config, body: Body, wanted: Target) -> None:
     Raises:
         InvalidArgumentError: one of them does not.
     """
-    if body.n_outputs != wanted.n_outputs:
-        raise InvalidArgumentError(
-            "body", f"{wanted.n_outputs} feedback channels for {wanted.name}", body.n_outputs
-        )
+    require_outputs(body, wanted)
     if config.window < orbits.PERIODS_NEEDED * wanted.period:
         raise InvalidArgumentError(
             "window",

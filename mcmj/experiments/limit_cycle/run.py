@@ -19,7 +19,7 @@ from mcmj.learning.teaching import synchronise, teach
 from mcmj.metrics import orbits
 from mcmj.mjcf.write import to_mjcf
 from mcmj.simulation.simulation import Simulation
-from mcmj.targets.limit_cycles import Target, target
+from mcmj.targets.limit_cycles import Target
 from mcmj.utils.checkpoint import Checkpoint
 from mcmj.utils.errors import DivergenceError
 from mcmj.utils.files import only_run
@@ -107,10 +107,15 @@ Outcomes = dict[str, TaskResult | DivergenceError]
 def checkpoints(config: Config, folder: Path, found: Found) -> dict[str, Checkpoint]:
     """Where the free runs of a config keep what they need to go on, one a task."""
     body, readouts, _ = found
-    digest = hashlib.sha256(to_mjcf(body, readouts=readouts).encode()).hexdigest()
+    xml = to_mjcf(body, readouts=readouts).encode()
+
+    def account(wanted: Target) -> list[object]:
+        orbit = wanted.orbit(orbits.ORBIT_POINTS)  # a file may have changed under the same name
+        return [config, hashlib.sha256(xml + orbit.tobytes()).hexdigest()]
+
     return {
-        name: Checkpoint(folder / f".checkpoint-{name}", [config, digest], body.n_outputs)
-        for name in config.tasks
+        name: Checkpoint(folder / f".checkpoint-{name}", account(wanted), body.n_outputs)
+        for name, wanted in config.targets.items()
     }
 
 
@@ -156,7 +161,7 @@ def _over_seeds(config: Config, first: Outcomes, on_steps: OnSteps) -> SuccessOf
     for seed in range(config.noise_seed + 1, config.noise_seed + config.seeds):
         one = replace(config, seed=seed, seeds=1)
         found.append(_error_pairs(run_tasks(one, get_body(one), on_steps=on_steps)))
-    errors = {name: np.array([pairs[name] for pairs in found]) for name in config.tasks}
+    errors = {name: np.array([pairs[name] for pairs in found]) for name in config.targets}
     return SuccessOfSeeds(
         config.noise_seed,
         config.threshold,
@@ -192,7 +197,7 @@ def run_tasks(
         BodyFileError, InvalidArgumentError: a body that cannot do the task.
     """
     body, readouts, _ = found
-    targets = {name: target(name) for name in config.tasks}
+    targets = config.targets
     for wanted in targets.values():
         check_task(config, body, wanted)
 

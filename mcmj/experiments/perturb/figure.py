@@ -75,13 +75,13 @@ def _draw_run(
         if noisy:
             window = slice(boundaries[1], boundaries[2])
             time_axes.plot(times[window], fed[window], color=CHANGE_COLOUR, lw=0.3, alpha=0.25)
-            plane.plot(*fed[window].T, ",", color=CHANGE_COLOUR, alpha=0.15)
+            plane.plot(*fed[window, :2].T, ",", color=CHANGE_COLOUR, alpha=0.15)
         for colour, first, last in zip(PHASE_COLOURS, boundaries, boundaries[1:], strict=False):
             rows = slice(first, last + 1)
-            for c in range(2):
+            for c in range(outputs.shape[1]):
                 time_axes.plot(times[rows], outputs[rows, c], color=colour, lw=1.1,
-                               ls=OUTPUT_STYLES[c]["ls"])  # fmt: skip
-            plane.plot(*outputs[rows].T, color=colour, lw=0.7)
+                               ls=OUTPUT_STYLES[c % 2]["ls"])  # fmt: skip
+            plane.plot(*outputs[rows, :2].T, color=colour, lw=0.7)
         if np.isfinite(recovery):
             time_axes.axvline(end + recovery, color=RECOVERED_COLOUR, lw=1, ls=":")
         last_shown = end + max(shown, 1.3 * recovery if np.isfinite(recovery) else 0.0)
@@ -122,11 +122,11 @@ def swing_up_figure(runs: Mapping[str, tuple[Target, float, Array, float, float]
         arrived = np.isfinite(swing_up)
         end = max(20.0, 1.5 * swing_up) if arrived else np.inf
         rows = times <= end
-        for c in range(2):
-            time_axes.plot(times[rows], outputs[rows, c], lw=1.2, **OUTPUT_STYLES[c])
-        plane.plot(*outputs[rows].T, color="black", lw=0.8)
+        for c in range(outputs.shape[1]):
+            time_axes.plot(times[rows], outputs[rows, c], lw=1.2, **OUTPUT_STYLES[c % 2])
+        plane.plot(*outputs[rows, :2].T, color="black", lw=0.8)
         if len(times):
-            plane.plot(*outputs[0], "o", color=CHANGE_COLOUR, ms=6)
+            plane.plot(*outputs[0, :2], "o", color=CHANGE_COLOUR, ms=6)
         if arrived:
             time_axes.axvline(swing_up, color=CHANGE_COLOUR, lw=1.2, ls=":")
         when = f"on the orbit after {swing_up:.1f} s" if arrived else "does not arrive"

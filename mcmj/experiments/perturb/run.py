@@ -15,8 +15,9 @@ from mcmj.metrics.success_rates import success_rate
 from mcmj.mjcf.bundled import open_body
 from mcmj.simulation.run_phases import Phase, RandomForces, Schedule, run_schedule
 from mcmj.simulation.simulation import Simulation
-from mcmj.targets.limit_cycles import TARGETS, Target, target
-from mcmj.utils.errors import DivergenceError, InvalidArgumentError, UnknownNameError
+from mcmj.targets.limit_cycles import Target
+from mcmj.targets.named import named_target, require_outputs
+from mcmj.utils.errors import DivergenceError, InvalidArgumentError
 from mcmj.utils.progress import OnSteps
 from mcmj.utils.validation import (
     Array,
@@ -46,7 +47,7 @@ class Config:
     """What to run.
 
     Attributes:
-        task: van_der_pol, quadratic or lissajous.
+        task: van_der_pol, .., a .csv file or package.module:function.
         body: a body file, or the name of a body that comes with mcmj; default: a random body.
             It is always taught: readouts in the file are not used. Integrator and spring law
             are the file's, unless the engine is the twin.
@@ -82,8 +83,7 @@ class Config:
     teaching: Teaching = field(default_factory=lambda: TAUGHT)
 
     def __post_init__(self) -> None:
-        if self.task not in TARGETS:
-            raise UnknownNameError("task", self.task, TARGETS)
+        period = named_target(self.task).period
         require_seed("seed", self.seed)
         require_count("seeds", self.seeds, 1)
         require_timestep("timestep", self.timestep)
@@ -96,7 +96,6 @@ class Config:
             require_number("noise_curve", std, 0.0, open_low=True)
         if self.body is not None and (self.settings != DRAWN or self.seeds > 1):
             raise InvalidArgumentError("body", "no settings or seeds beside it", self.body)
-        period = target(self.task).period
         require_number("after", self.after, 2 * period)
         require_number("error_window", self.error_window, orbits.PERIODS_NEEDED * period)
 
@@ -105,8 +104,10 @@ class Config:
         """The disturbed phases of Fig. 6, by name."""
         disturbed = Phase(self.window)
         return {
-            "frozen_x1": replace(disturbed, freeze=(0,)),
-            "frozen_x2": replace(disturbed, freeze=(1,)),
+            **{
+                f"frozen_x{output + 1}": replace(disturbed, freeze=(output,))
+                for output in range(named_target(self.task).n_outputs)
+            },
             "random_forces": replace(disturbed, forces=RandomForces(self.force)),
             "length_noise": replace(disturbed, length_noise=self.sensor_noise),
         }
@@ -166,7 +167,7 @@ class Result:
     def readouts(self) -> dict[str, Array]:
         """The first body's readout by task; empty if it blew up under the teacher."""
         fit = self.bodies[0].fit
-        return {} if fit is None else {self.config.task: fit.w_out}
+        return {} if fit is None else {self.target.name: fit.w_out}
 
     @property
     def metrics(self) -> dict[str, object]:
@@ -214,8 +215,12 @@ def total_steps(config: Config) -> int:
 
 
 def run(config: Config, *, on_steps: OnSteps = lambda steps: None) -> Result:
-    """Teach every body, disturb it in every way, and measure how it comes back."""
-    wanted = target(config.task)
+    """Teach every body, disturb it in every way, and measure how it comes back.
+
+    Raises:
+        InvalidArgumentError: a body without as many outputs as the task has.
+    """
+    wanted = named_target(config.task)
     bodies = [
         _of_body(config, config.seed + index, wanted, on_steps) for index in range(config.seeds)
     ]
@@ -223,24 +228,19 @@ def run(config: Config, *, on_steps: OnSteps = lambda steps: None) -> Result:
 
 
 def get_body(config: Config, seed: int) -> tuple[Body, dict[str, object], dict[str, Any]]:
-    """The body of a seed, or the config's; where it comes from; arguments of its Simulation.
-
-    Raises:
-        InvalidArgumentError: a body without two feedback channels.
-    """
+    """The body of a seed, or the config's; where it comes from; arguments of its Simulation."""
     given: dict[str, Any] = {"timestep": config.timestep}
     if config.body is None:
         source = {"seed": seed, "settings": asdict(config.settings)}
         return draw_body(seed, config.settings), source, given
     stored = open_body(config.body)
-    if stored.body.n_outputs != 2:
-        raise InvalidArgumentError("body", "2 feedback channels", stored.body.n_outputs)
     names = ("integrator", "springs") if config.engine == "mujoco" else ()
     return stored.body, stored.provenance, stored.take(*names, **given)
 
 
 def _of_body(config: Config, seed: int, wanted: Target, on_steps: OnSteps) -> BodyResult:
     body, source, settings = get_body(config, seed)
+    require_outputs(body, wanted)
     simulation = Simulation(body, engine=config.engine, **settings)
     curve = [Phase(config.window, length_noise=std) for std in config.noise_curve]
     try:

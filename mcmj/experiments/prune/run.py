@@ -12,7 +12,7 @@ from mcmj.learning.lessons import Teaching
 from mcmj.learning.spring_selection import METHODS, importance, sense_only
 from mcmj.learning.teaching import Course, lessons_of
 from mcmj.simulation.simulation import Simulation
-from mcmj.targets.limit_cycles import TARGETS, target
+from mcmj.targets.named import named_target
 from mcmj.utils.errors import InvalidArgumentError, UnknownNameError
 from mcmj.utils.progress import OnSteps
 from mcmj.utils.validation import Array, require_count, require_number
@@ -23,7 +23,7 @@ class Config:
     """What to run.
 
     Attributes:
-        task: van_der_pol, quadratic or lissajous.
+        task: van_der_pol, .., a .csv file or package.module:function.
         body: a body file, or the name of a body that comes with mcmj; default: the general
             body, unless a seed, several seeds or changed settings ask for random ones.
         seed: of the random body and of the noise; default 0.
@@ -56,8 +56,7 @@ class Config:
     teaching: Teaching = field(default_factory=Teaching)
 
     def __post_init__(self) -> None:
-        if self.task not in TARGETS:
-            raise UnknownNameError("task", self.task, TARGETS)
+        named_target(self.task)
         for name in ("seeds", "starts"):
             require_count(name, getattr(self, name), 1)
         for method in self.methods:
@@ -157,7 +156,7 @@ def run(config: Config, *, on_steps: OnSteps = lambda steps: None) -> Result:
 
 def _of_body(one: limit_cycle.Config, config: Config, on_steps: OnSteps) -> Pruned:
     body, _, _ = limit_cycle.get_body(one)
-    wanted, teaching = target(config.task), config.teaching
+    wanted, teaching = named_target(config.task), config.teaching
     limit_cycle.check_task(one, body, wanted)
     simulation = Simulation(body, timestep=config.timestep, engine=config.engine)
     course = Course(simulation, teaching, one.noise_seed)

@@ -16,9 +16,9 @@ from mcmj.simulation.phases import Phase, Schedule
 from mcmj.simulation.run_phases import ScheduleRun, run_schedule
 from mcmj.simulation.simulation import Simulation
 from mcmj.simulation.trajectory_files.npz import load_trajectory
-from mcmj.targets.gaits import NAMES, named_target
 from mcmj.targets.limit_cycles import Target
-from mcmj.utils.errors import InvalidArgumentError, TrajectoryFileError, UnknownNameError
+from mcmj.targets.named import NAMES, named_target, require_outputs
+from mcmj.utils.errors import TrajectoryFileError, UnknownNameError
 from mcmj.utils.progress import OnSteps
 from mcmj.utils.seeds import stream
 from mcmj.utils.validation import Array, require_count, require_duration, require_number
@@ -37,9 +37,10 @@ class Config:
             of a run.
         readout: name of a readout in the body file; default: that of the task, else its active
             one; a body without any is taught the task.
-        task: target drawn in red, on which the run starts, and what a body without readout is
-            taught; default: the readout's name if it is a target, else none (such a run starts
-            at rest), or van_der_pol for a body without readout.
+        task: van_der_pol, .., a gait, a .csv file or package.module:function: drawn in red, on
+            which the run starts, and what a body without readout is taught; default: the
+            readout's name if it is a target, else none (such a run starts at rest), or
+            van_der_pol for a body without readout.
         seed: of noise and random forces.
         duration: of the run, if nothing disturbs it [s].
         freeze: outputs (1, 2, ..) that are held at their value while the body is disturbed.
@@ -85,8 +86,8 @@ class Config:
         for kind in self.formats:
             if kind not in FORMATS:
                 raise UnknownNameError("format", kind, FORMATS)
-        if self.task is not None and self.task not in NAMES:
-            raise UnknownNameError("task", self.task, NAMES)
+        if self.task is not None:
+            named_target(self.task)
 
     @property
     def disturbance(self) -> str:
@@ -141,16 +142,15 @@ def _find(config: Config, stored: StoredBody) -> tuple[Array | None, Target | No
     body, named = stored.body, stored.readouts
     if config.readout is not None and config.readout not in named:
         raise UnknownNameError("readout", config.readout, named)
-    name = config.readout or config.task or next(iter(named), "")
+    wanted = None if config.task is None else named_target(config.task)
+    name = config.readout or (wanted.name if wanted else next(iter(named), ""))
     w_out = named[name] if named and name in named else None
     if w_out is None and not named:
         w_out = stored.w_out
-    task = config.task or (name if name in NAMES else None)
-    if task is None and w_out is None:
-        task = "van_der_pol"
-    wanted = None if task is None else named_target(task)
-    if wanted is not None and body.n_outputs != wanted.n_outputs:
-        raise InvalidArgumentError("body", f"{wanted.n_outputs} outputs for {task}", body)
+    if wanted is None and (name in NAMES or w_out is None):
+        wanted = named_target(name if name in NAMES else "van_der_pol")
+    if wanted is not None:
+        require_outputs(body, wanted)
     return w_out, wanted
 
 

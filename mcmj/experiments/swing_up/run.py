@@ -13,7 +13,7 @@ from mcmj.learning.teaching import Course, lessons_of
 from mcmj.metrics import orbits
 from mcmj.metrics.success_rates import success_rate
 from mcmj.simulation.simulation import Simulation
-from mcmj.targets.limit_cycles import Target, target
+from mcmj.targets.limit_cycles import Target
 from mcmj.utils.errors import DivergenceError, InvalidArgumentError
 from mcmj.utils.progress import OnSteps
 from mcmj.utils.seeds import stream
@@ -32,7 +32,8 @@ class Config:
     """What to run.
 
     Attributes:
-        task: van_der_pol, quadratic, lissajous, or all three (by the same body).
+        task: van_der_pol, quadratic, lissajous, or all of these (by the same body); a gait; a .csv
+            file; package.module:function.
         body: a body file, or the name of a body that comes with mcmj; default: the general
             body, unless a seed, several seeds or changed settings ask for random ones.
         seed: of the random body and of the noise; default 0.
@@ -179,7 +180,7 @@ class Result:
 def total_steps(config: Config) -> int:
     """Control steps of a whole run, for a progress bar; rounds of practice are not foreseen."""
     seconds = config.teaching.total + config.practice.trial + (1 + config.kicks) * config.free_run
-    return config.seeds * len(config.of_seed(0).tasks) * round(seconds / config.timestep)
+    return config.seeds * len(config.of_seed(0).targets) * round(seconds / config.timestep)
 
 
 def run(config: Config, *, on_steps: OnSteps = lambda steps: None) -> Result:
@@ -188,21 +189,21 @@ def run(config: Config, *, on_steps: OnSteps = lambda steps: None) -> Result:
     Raises:
         BodyFileError, InvalidArgumentError: a body that cannot do the task.
     """
-    names = config.of_seed(0).tasks
-    pairs = [(config.of_seed(index), name) for index in range(config.seeds) for name in names]
+    targets = config.of_seed(0).targets
+    pairs = [(config.of_seed(index), name) for index in range(config.seeds) for name in targets]
     first = pairs[0][0]
     first_body, _, _ = limit_cycle.get_body(first)
-    for name in names:
-        limit_cycle.check_task(first, first_body, target(name))
+    for wanted in targets.values():
+        limit_cycle.check_task(first, first_body, wanted)
 
     def work(pair: tuple[limit_cycle.Config, str], report: OnSteps) -> SwingUp:
         one, name = pair
         body = first_body if one == first else limit_cycle.get_body(one)[0]
-        return _swing_up(config, body, target(name), one.noise_seed, report)
+        return _swing_up(config, body, targets[name], one.noise_seed, report)
 
     runs = iter(in_threads(work, pairs, on_steps))
     return Result(
-        config, first_body, [dict(zip(names, runs, strict=False)) for _ in range(config.seeds)]
+        config, first_body, [dict(zip(targets, runs, strict=False)) for _ in range(config.seeds)]
     )
 
 
@@ -213,7 +214,7 @@ def _swing_up(config: Config, body: Body, wanted: Target, seed: int, on_steps: O
     try:
         course.attend_all(lessons_of(wanted, config.teaching), on_steps=on_steps)
     except DivergenceError:
-        return SwingUp(wanted, None, np.zeros((0, 2)), np.inf, np.inf, (), None)
+        return SwingUp(wanted, None, np.zeros((0, body.n_outputs)), np.inf, np.inf, (), None)
     practised = practise(course, wanted, config.practice, on_steps=on_steps)
     outputs = _free_run(config, simulation, None, on_steps)
     speeds = stream(seed, "initial_state")
@@ -241,7 +242,7 @@ def _swing_up(config: Config, body: Body, wanted: Target, seed: int, on_steps: O
 def _free_run(
     config: Config, simulation: Simulation, velocities: Array | None, on_steps: OnSteps
 ) -> Array:
-    """Outputs (T, 2) of a free run from the body's rest positions; empty if it blows up."""
+    """Outputs (T, n_outputs) of a free run from the body's rest positions; empty if it blows up."""
     steps = round(config.free_run / config.timestep)
     simulation.reset()
     if velocities is not None:
@@ -249,7 +250,7 @@ def _free_run(
     try:
         return simulation.rollout(steps, record=("outputs",)).get("outputs")
     except DivergenceError:
-        return np.zeros((0, 2))
+        return np.zeros((0, simulation.body.n_outputs))
     finally:
         on_steps(steps)
 

@@ -20,9 +20,10 @@ from mcmj.mjcf.bundled import StoredBody, body_names, open_body
 from mcmj.mjcf.read import from_mjcf
 from mcmj.mjcf.write import to_mjcf
 from mcmj.simulation.simulation import Simulation
-from mcmj.targets.gaits import GAITS, LEGS, NAMES, named_target
+from mcmj.targets.gaits import GAITS, LEGS
 from mcmj.targets.input_systems import QUADRATIC
 from mcmj.targets.limit_cycles import TARGETS, Target
+from mcmj.targets.named import NAMES, named_target
 from mcmj.utils.errors import InvalidArgumentError, UnknownNameError
 from mcmj.utils.validation import Array
 
