@@ -6,6 +6,7 @@ import sys
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
 import pytest
 from searches import tiny_trials
 
@@ -63,6 +64,17 @@ def test_the_key_knows_the_content_of_the_body_file(tmp_path):
     for content in (text, text, text + " "):
         file.write_text(content)
         keys.add(Trial("certify", certify.Config(body=str(file))).key)
+    assert len(keys) == 2
+
+
+def test_the_key_knows_the_curve_behind_a_name(tmp_path):
+    file = tmp_path / "circle.csv"
+    keys = set()
+    for size in (1.0, 1.0, 2.0):
+        angles = 2 * np.pi * np.arange(50) / 50
+        circle = np.column_stack([0.1 * np.arange(50), size * np.sin(angles), np.cos(angles)])
+        np.savetxt(file, circle, delimiter=",", header="time,x1,x2", comments="")
+        keys.add(Trial("certify", certify.Config(task=str(file))).key)
     assert len(keys) == 2
 
 
