@@ -1,6 +1,5 @@
 """Figures in the manner of the paper's. Takes results, never simulates."""
 
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -22,7 +21,6 @@ from mcmj.utils.colours import (
     BLUE,
     FEEDBACK_COLOURS,
     FIXED_COLOUR,
-    GROUP_COLOURS,
     INPUT_COLOUR,
     PLAIN_COLOUR,
     TARGET_COLOUR,
@@ -131,83 +129,6 @@ def draw_orbit(axes: Axes, target: Target) -> None:
 def count_in_whole_numbers(axes: Axes) -> None:
     """Ticks of an x axis that counts: there are no 1.25 bodies."""
     axes.xaxis.set_major_locator(MaxNLocator(integer=True))
-
-
-def limit_cycle_figure(
-    body: Body,
-    runs: Sequence[tuple[Target, Array, Array, dict[str, float]]],
-    *,
-    free_run: float,
-    window: float,
-) -> Figure:
-    """Fig. 5: for each task the first and the last part of the free run, its phase plane; the body.
-
-    Args:
-        runs: per task: target, times (T,) [s], outputs (T, n) of the free run, errors by name.
-        free_run, window: lengths of the run and of the part that the errors are of [s].
-    """
-    figure = new_figure(15.5, 3.3 * len(runs) + 0.9)
-    grid = figure.add_gridspec(len(runs), 4, width_ratios=[1.6, 1.6, 1.0, 1.35])
-    for row, (target, times, outputs, errors) in enumerate(runs):
-        start, step = times[0], times[1] - times[0]
-        shown = min(round(window / step), len(times))
-        first, last, plane = (figure.add_subplot(grid[row, column]) for column in range(3))
-        wanted = target.sample(times[:shown])
-        draw_outputs(first, times[:shown] - start, outputs[:shown], wanted)
-        end = outputs[-shown:]
-        shift = best_phase(end, target, times[-shown:])
-        draw_outputs(last, times[-shown:] - start, end, target.sample(times[-shown:] + shift))
-        draw_phase_plane(plane, end, target)
-        first.set_ylabel("outputs")
-        first.set_title(f"{TITLES.get(target.name, target.name)}: loop closed at 0 s")
-        last.set_title(f"last {window:g} s of {free_run:g} s (target moved by {shift:+.2f} s)")
-        plane.set_title(
-            f"orbit error {100 * errors['orbit_error']:.2f} %\n"
-            f"period error {100 * errors['period_error']:.3f} %"
-        )
-        if row == 0:
-            handles = output_handles(outputs.shape[1])
-            figure.legend(handles=handles, loc="outside upper center", ncols=3, frameon=False)
-    draw_body(figure.add_subplot(grid[:, 3]), body)
-    return figure
-
-
-def success_figure(orbit_errors: dict[str, Array], threshold: float) -> Figure:
-    """Orbit errors of many bodies, sorted, one curve a task; failures stand above the line."""
-    figure = new_figure(7.5, 4.2)
-    axes = figure.add_subplot()
-    top = 2.0  # everything worse, blow-ups too, is drawn here
-    for (name, errors), colour in zip(orbit_errors.items(), GROUP_COLOURS, strict=False):
-        good = int((errors < threshold).sum())
-        axes.semilogy(
-            np.arange(1, len(errors) + 1), np.sort(np.minimum(errors, top)), ".-", ms=4, lw=0.8,
-            color=colour, label=f"{TITLES.get(name, name)}: {good} of {len(errors)}",
-        )  # fmt: skip
-    label = f"success below {100 * threshold:g} %"
-    axes.axhline(threshold, color=TARGET_COLOUR, ls="--", lw=1, label=label)
-    axes.set(xlabel="body, sorted by error (each task for itself)", ylabel="orbit error")
-    axes.legend(frameon=False)
-    axes.grid(alpha=0.3)
-    count_in_whole_numbers(axes)
-    return figure
-
-
-def growth_figure(rows: Sequence[dict[str, float]]) -> Figure:
-    """Cost of a step and of compiling against the number of springs."""
-    figure = new_figure(9.0, 3.8)
-    left, right = figure.subplots(1, 2)
-    springs = [row["springs"] for row in rows]
-    for engine, colour in (("mujoco", BLACK), ("twin", BLUE)):
-        costs = [row[f"{engine}_ns_per_spring_step"] for row in rows]
-        left.loglog(springs, costs, "o-", color=colour, label=engine)
-    left.set(xlabel="springs", ylabel="cost [ns per spring and step]")
-    left.legend(frameon=False)
-    left.set_title("flat = linear in the size of the body")
-    right.loglog(springs, [row["compile_seconds"] for row in rows], "o-", color="black")
-    right.set(xlabel="springs", ylabel="time to build a Simulation [s]")
-    for axes in (left, right):
-        axes.grid(alpha=0.3, which="both")
-    return figure
 
 
 def best_phase(outputs: Array, target: Target, times: Array) -> float:

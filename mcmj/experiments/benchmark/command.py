@@ -2,21 +2,14 @@
 
 from typing import Any
 
-from matplotlib.figure import Figure
 from rich.console import Console
 from rich.table import Table
 
 from mcmj.experiments.base import Experiment
+from mcmj.experiments.benchmark.figure import figures
 from mcmj.experiments.benchmark.run import PARTS, Config, Result, run
-from mcmj.pictures import plotting
 from mcmj.utils import files
 from mcmj.utils.progress import progress_bar
-
-
-def figures(result: Result) -> dict[str, Figure]:
-    """How the cost of a step grows with the body."""
-    metrics: Any = files.plain(result.metrics)
-    return {"growth": plotting.growth_figure(metrics["growth"])}
 
 
 def show(result: Result, console: Console) -> None:

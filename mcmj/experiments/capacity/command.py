@@ -1,25 +1,12 @@
 """The command: capacity."""
 
-from matplotlib.figure import Figure
 from rich.console import Console
 from rich.table import Table
 
 from mcmj.experiments.base import Experiment
-from mcmj.experiments.capacity.figure import capacity_figure
+from mcmj.experiments.capacity.figure import figures
 from mcmj.experiments.capacity.run import Config, Result, run, total_bodies
 from mcmj.utils.progress import progress_bar
-
-
-def figures(result: Result) -> dict[str, Figure]:
-    """Capacity by delay, and maps over settings."""
-    config = result.config
-    axes = {
-        "stiffness_damping": ("stiffness factor", config.stiffness, "damping factor",
-                              config.damping),
-        "size_strength": ("nodes", config.sizes, "input strength [N]", config.strengths),
-    }  # fmt: skip
-    maps = {name: (*axes[name], measures) for name, measures in result.maps.items()}
-    return {"capacity": capacity_figure(result.by_delay, maps)}
 
 
 def show(result: Result, console: Console) -> None:

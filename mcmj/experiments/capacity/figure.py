@@ -1,12 +1,13 @@
-"""The figure of scripts/capacity.py. Takes results, never simulates."""
+"""What a body is worth: capacity by delay, and maps over settings."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
 import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from mcmj.experiments.capacity.run import Result
 from mcmj.pictures.plotting import new_figure
 from mcmj.utils.colours import GROUP_COLOURS
 from mcmj.utils.validation import Array
@@ -19,20 +20,24 @@ NAMES = {
 }
 
 
-def capacity_figure(
-    by_delay: Mapping[int, Array],
-    maps: Mapping[str, tuple[str, Sequence[float], str, Sequence[float], Mapping[str, Array]]],
-) -> Figure:
-    """A row of measures for each map; above, the body's capacities over the delay.
+def figures(result: Result) -> dict[str, Figure]:
+    """By file name."""
+    return {"capacity": capacity_figure(result)}
 
-    Args:
-        by_delay: [degree] capacities summed over all targets of that oldest delay 0, 1, ...
-        maps: [map] row label, row values, column label, column values, [measure] (rows, columns).
-    """
+
+def capacity_figure(result: Result) -> Figure:
+    """The body's capacities over the delay; below, a row of measures for each map."""
+    config, maps = result.config, result.maps
+    sides = {
+        "stiffness_damping": ("stiffness factor", config.stiffness, "damping factor",
+                              config.damping),
+        "size_strength": ("nodes", config.sizes, "input strength [N]", config.strengths),
+    }  # fmt: skip
     figure = new_figure(15.5, 3.2 + 3.6 * len(maps))
     grid = figure.add_gridspec(1 + len(maps), len(NAMES))
-    _draw_delays(figure.add_subplot(grid[0, :]), by_delay)
-    for row, (y_label, ys, x_label, xs, measures) in enumerate(maps.values(), start=1):
+    _draw_delays(figure.add_subplot(grid[0, :]), result.by_delay)
+    for row, (map_name, measures) in enumerate(maps.items(), start=1):
+        y_label, ys, x_label, xs = sides[map_name]
         for column, (name, title) in enumerate(NAMES.items()):
             axes = figure.add_subplot(grid[row, column])
             _draw_map(axes, measures[name])

@@ -1,53 +1,43 @@
-"""The report card of `mcmj.experiments.certify.run` as a figure. Takes arrays, never simulates."""
+"""The report card of a trained body on one page."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
-import numpy.typing as npt
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from mcmj.analysis.stability.basin import Survey
+from mcmj.analysis.stability.floquet import Complex
+from mcmj.analysis.stability.tolerance import Tolerance
+from mcmj.experiments.certify.result import Result, in_words
 from mcmj.pictures.plotting import TITLES, draw_orbit, draw_phase_plane, new_figure
-from mcmj.targets.limit_cycles import Target
 from mcmj.utils.colours import BLUE, ORANGE, TARGET_COLOUR
-from mcmj.utils.validation import Array
-
-Complex = npt.NDArray[np.complex128]
 
 
-def certificate_figure(
-    target: Target,
-    outputs: Array,
-    *,
-    multipliers: Complex,
-    target_multipliers: Complex | None,
-    starts: tuple[Array, Array],
-    blows: Sequence[tuple[str, Array, Array, Array]],
-    tolerances: Sequence[tuple[str, Array, float, tuple[float, float]]],
-    lines: Sequence[tuple[str, str]],
-) -> Figure:
-    """One page.
+def figures(result: Result) -> dict[str, Figure]:
+    """By file name."""
+    return {"certificate": certificate_figure(result)}
 
-    Args:
-        outputs: (T, n) of the end of the free run.
-        multipliers, target_multipliers: complex, of the body and of its target's system.
-        starts: first outputs (B, n), and recovery times (B,) [s], infinite if lost.
-        blows: per kind: axis label, strengths (K,), recovered and overflowed fractions (K,).
-        tolerances: per kind: label, largest amplitudes (B,) that copies recover from, their
-            median and its interval.
-        lines: names and values of the text panel.
-    """
+
+def certificate_figure(result: Result) -> Figure:
+    """One page: orbit, multipliers, starts, blows, tolerances, and all in words."""
+    target, config = result.target, result.config
     figure = new_figure(15.0, 8.6)
     grid = figure.add_gridspec(2, 4, width_ratios=[1, 1, 1, 1.15])
     axes = [figure.add_subplot(grid[row, column]) for row in range(2) for column in range(3)]
-    draw_phase_plane(axes[0], outputs, target)
+    draw_phase_plane(axes[0], result.outputs, target)
     axes[0].set_title("free run, red: target")
-    _draw_multipliers(axes[1], multipliers, target_multipliers)
-    _draw_starts(figure, axes[2], target, *starts)
-    for ax, (label, strengths, good, blown) in zip(axes[3:5], blows, strict=True):
-        _draw_blows(ax, label, strengths, good, blown)
+    _draw_multipliers(axes[1], result.floquet.multipliers, result.target_multipliers)
+    _draw_starts(axes[2], result)
+    _draw_blows(axes[3], "velocity kick [RMS node speed]", config.kicks, result.kicks)
+    _draw_blows(axes[4], "random forces for 1 s, F [N]", config.pushes, result.pushes)
+    tolerances = {
+        "forces [N], own step": result.force,
+        "forces [N], refined steps": result.force_fine,
+        "noise on lengths [m]": result.noise,
+    }
     _draw_tolerances(axes[5], tolerances)
-    _draw_lines(figure.add_subplot(grid[:, 3]), lines)
+    _draw_lines(figure.add_subplot(grid[:, 3]), in_words(result))
     figure.suptitle(f"Certificate: {TITLES.get(target.name, target.name)}")
     return figure
 
@@ -65,13 +55,14 @@ def _draw_multipliers(axes: Axes, body: Complex, target: Complex | None) -> None
     axes.legend(loc="center", bbox_to_anchor=(0.5, 0.28))
 
 
-def _draw_starts(figure: Figure, axes: Axes, target: Target, first: Array, times: Array) -> None:
-    draw_orbit(axes, target)
+def _draw_starts(axes: Axes, result: Result) -> None:
+    first, times = result.start_outputs, result.starts.times
+    draw_orbit(axes, result.target)
     good, known = np.isfinite(times), np.isfinite(first).all(axis=1)
     points = axes.scatter(
         first[good, 0], first[good, 1], c=times[good], s=16, cmap="viridis", zorder=3
     )
-    figure.colorbar(points, ax=axes, label="recovery time [s]", shrink=0.75)
+    axes.figure.colorbar(points, ax=axes, label="recovery time [s]", shrink=0.75)
     axes.plot(*first[~good & known, :2].T, "x", color="black", ms=5, zorder=4)
     axes.set(xlabel="first $x_1$", ylabel="first $x_2$")
     axes.set_title(
@@ -79,7 +70,10 @@ def _draw_starts(figure: Figure, axes: Axes, target: Target, first: Array, times
     )
 
 
-def _draw_blows(axes: Axes, label: str, strengths: Array, good: Array, blown: Array) -> None:
+def _draw_blows(axes: Axes, label: str, strengths: Sequence[float], survey: Survey) -> None:
+    good, blown = (
+        kind.reshape(len(strengths), -1).mean(axis=1) for kind in (survey.recovered, survey.blown)
+    )
     axes.semilogx(strengths, good, "o-", color=BLUE, label="recovered")
     axes.semilogx(strengths, blown, "s--", color=ORANGE, ms=4, label="overflowed")
     axes.set(xlabel=label, ylabel="fraction", ylim=(-0.05, 1.05))
@@ -87,12 +81,11 @@ def _draw_blows(axes: Axes, label: str, strengths: Array, good: Array, blown: Ar
     axes.grid(alpha=0.3)
 
 
-def _draw_tolerances(
-    axes: Axes, tolerances: Sequence[tuple[str, Array, float, tuple[float, float]]]
-) -> None:
+def _draw_tolerances(axes: Axes, tolerances: Mapping[str, Tolerance]) -> None:
     axes.set_xscale("log")
-    for row, (label, values, median, (low, high)) in enumerate(tolerances):
-        line = axes.ecdf(values, complementary=True, label=label)
+    for row, (label, one) in enumerate(tolerances.items()):
+        median, (low, high) = one.median, one.interval
+        line = axes.ecdf(one.values, complementary=True, label=label)
         if np.isfinite(high):
             bar, y = [[median - low], [high - median]], 0.5 + 0.04 * (row - 1)
             axes.errorbar(median, y, xerr=bar, fmt="o", ms=4, capsize=3, color=line.get_color())

@@ -1,7 +1,6 @@
 """The report card of a trained body: how good its rhythm is, and how hard to destroy."""
 
 import os
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -17,13 +16,13 @@ from mcmj.analysis.stability.basin import (
 )
 from mcmj.analysis.stability.confirm import monodromy_error, verdicts
 from mcmj.analysis.stability.cycle import Cycle, find_cycle
-from mcmj.analysis.stability.floquet import Complex, Floquet, floquet, target_multipliers
+from mcmj.analysis.stability.floquet import floquet, target_multipliers
 from mcmj.analysis.stability.loop import ClosedLoop
-from mcmj.analysis.stability.lyapunov import Exponent, lyapunov_exponent
-from mcmj.analysis.stability.phase import Diffusion, phase_diffusion
-from mcmj.analysis.stability.tolerance import Tolerance, Trial, force_tolerance, noise_tolerance
-from mcmj.core.body import Body
+from mcmj.analysis.stability.lyapunov import lyapunov_exponent
+from mcmj.analysis.stability.phase import phase_diffusion
+from mcmj.analysis.stability.tolerance import Trial, force_tolerance, noise_tolerance
 from mcmj.experiments.certify.config import Config
+from mcmj.experiments.certify.result import Result
 from mcmj.experiments.limit_cycle import run as limit_cycle
 from mcmj.learning.teaching import synchronise, teach
 from mcmj.metrics import orbits
@@ -37,79 +36,6 @@ from mcmj.utils.seeds import stream
 from mcmj.utils.validation import Array
 
 STAGES = ("run", "floquet", "lyapunov", "phase", "starts", "kicks", "pushes", "force", "noise")
-
-
-@dataclass(frozen=True)
-class Result:
-    """The certificate.
-
-    Attributes:
-        errors: of the MuJoCo run, by name.
-        outputs: (T, n_outputs) of its last window.
-        floquet, target: multipliers of the body, and of the system it was taught (or None).
-        mujoco_monodromy_error: of the phase's and the leading direction, |D d - M d| / |d|.
-        starts, kicks, pushes: surveys of scales x phases, kicks x copies, pushes x copies.
-        start_outputs: (B, n_outputs) of the starts' states.
-        rest_recovers: whether the loop comes to the orbit from total rest.
-        mujoco_agrees: of a sample of pushes: how many MuJoCo judges as the twin does, of how many.
-        force, force_fine, noise: tolerances of the copies: at the body's own step, where Euler
-            may fail before the body does, and with `refine`; of noise on the lengths.
-    """
-
-    config: Config
-    body: Body
-    target: Target
-    cycle: Cycle
-    errors: dict[str, float]
-    outputs: Array
-    floquet: Floquet
-    target_multipliers: Complex | None
-    mujoco_monodromy_error: float
-    exponent: Exponent
-    diffusion: Diffusion
-    starts: Survey
-    start_outputs: Array
-    rest_recovers: bool
-    kicks: Survey
-    pushes: Survey
-    mujoco_agrees: tuple[int, int]
-    force: Tolerance
-    force_fine: Tolerance
-    noise: Tolerance
-
-    @property
-    def metrics(self) -> dict[str, object]:
-        """As written to metrics.json; multipliers as [real, imaginary]."""
-        wanted = self.target_multipliers
-        return {
-            **self.errors,
-            "period": self.cycle.period,
-            "target_period": self.target.period,
-            "cycle_residual": self.cycle.residual,
-            "floquet_multipliers": _pairs(self.floquet.multipliers),
-            "floquet_multipliers_variational": _pairs(self.floquet.variational),
-            "floquet_disagreement": self.floquet.disagreement,
-            "phase_multiplier_error": abs(self.floquet.multipliers[0] - 1.0),
-            "leading_nontrivial": self.floquet.leading_nontrivial,
-            "mujoco_monodromy_error": self.mujoco_monodromy_error,
-            "target_multipliers": None if wanted is None else _pairs(wanted),
-            "target_leading_nontrivial": None if wanted is None else float(abs(wanted[1])),
-            "basin_fraction": self.starts.fraction,
-            "start_recovery_time": self.starts.median_time,
-            "rest_recovers": self.rest_recovers,
-            "kick_recovery": self.kicks.table(self.config.kicks),
-            "push_recovery": self.pushes.table(self.config.pushes),
-            "mujoco_pushes_agreeing": list(self.mujoco_agrees),
-            "lyapunov_exponent": self.exponent.value,
-            "lyapunov_spread": self.exponent.spread,
-            "phase_diffusion": self.diffusion.coefficient,
-            "phase_jitter_per_period": self.diffusion.jitter,
-            "phase_jitter_standard_error": self.diffusion.jitter_error,
-            "phase_diffusion_noise": self.diffusion.noise,
-            **_tolerances("force_tolerance", self.force_fine),
-            **_tolerances("force_tolerance_own_step", self.force),
-            **_tolerances("noise_tolerance", self.noise),
-        }
 
 
 def run(config: Config, *, on_steps: OnSteps = lambda steps: None) -> Result:
@@ -217,16 +143,6 @@ def _cycle(config: Config, goal: Target, loop: ClosedLoop, start: Array) -> Cycl
     return cycle
 
 
-def _tolerances(name: str, tolerance: Tolerance) -> dict[str, object]:
-    """The median over the copies, its interval, the weakest copy, and all of them."""
-    return {
-        name: tolerance.median,
-        f"{name}_interval_95": list(tolerance.interval),
-        f"{name}_least": tolerance.least,
-        f"{name}_by_copy": np.sort(tolerance.values),
-    }
-
-
 def _survey(config: Config, loop: ClosedLoop, goal: Target, states: Array) -> Survey:
     return survey(loop, goal, states, duration=config.recovery, threshold=config.threshold)
 
@@ -245,7 +161,3 @@ def _pushes(
     some = slice(None, None, copies)
     trial = Trial(1.0, config.recovery, config.threshold)
     return result, verdicts(loop, goal, states[some], forces[some], trial)
-
-
-def _pairs(values: Complex) -> list[list[float]]:
-    return [[float(v.real), float(v.imag)] for v in values]

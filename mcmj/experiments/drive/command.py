@@ -2,11 +2,10 @@
 
 from pathlib import Path
 
-from matplotlib.figure import Figure
 from rich.console import Console
 
 from mcmj.experiments.base import Experiment
-from mcmj.experiments.drive.figure import drive_figure
+from mcmj.experiments.drive.figure import figures
 from mcmj.experiments.drive.run import Config, Episode, Result, run, total_episodes
 from mcmj.utils import files
 from mcmj.utils.progress import progress_bar
@@ -21,14 +20,6 @@ def write(result: Result, folder: Path) -> None:
         for field in Episode.__dataclass_fields__
     }
     files.write_arrays(folder / "episodes.npz", arrays, result.config, result.config.seed)
-
-
-def figures(result: Result) -> dict[str, Figure]:
-    """The rewards, and the outputs before and after."""
-    before, after = (
-        (e.times, e.inputs, e.outputs, e.mean_reward) for e in (result.before, result.after)
-    )
-    return {"drive": drive_figure(result.target, result.rewards, before, after)}
 
 
 def show(result: Result, console: Console) -> None:

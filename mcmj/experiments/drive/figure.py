@@ -1,9 +1,10 @@
-"""Figure of a search for an input signal: rewards by round, and outputs without and with it."""
+"""A search for an input signal: rewards by round, and outputs without and with it."""
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from mcmj.experiments.drive.run import Episode, Result
 from mcmj.pictures.plotting import (
     OUTPUT_STYLES,
     TITLES,
@@ -11,29 +12,27 @@ from mcmj.pictures.plotting import (
     draw_phase_plane,
     new_figure,
 )
-from mcmj.targets.limit_cycles import Target
 from mcmj.utils.colours import BLUE, GREEN, RED
 from mcmj.utils.validation import Array
 
-Run = tuple[Array, Array, Array, float]
+
+def figures(result: Result) -> dict[str, Figure]:
+    """By file name."""
+    return {"drive": drive_figure(result)}
 
 
-def drive_figure(target: Target, rewards: Array, before: Run, after: Run) -> Figure:
-    """Learning curve; outputs over time and phase plane without input and with the learned one.
-
-    Args:
-        rewards: (rounds, population) mean rewards of the episodes.
-        before, after: times (K,) [s], inputs (K,), outputs (K, 2), mean reward.
-    """
+def drive_figure(result: Result) -> Figure:
+    """Learning curve; outputs over time and phase plane without input and with the learned one."""
+    target = result.target
     figure = new_figure(12.0, 6.2)
     grid = figure.add_gridspec(2, 3, width_ratios=[1.1, 1.9, 1.0])
-    _draw_learning(figure.add_subplot(grid[:, 0]), rewards, before[3])
-    for row, (name, run) in enumerate((("without input", before), ("learned input", after))):
+    _draw_learning(figure.add_subplot(grid[:, 0]), result.rewards, result.before.mean_reward)
+    episodes = {"without input": result.before, "learned input": result.after}
+    for row, (name, episode) in enumerate(episodes.items()):
         time_axes, plane = figure.add_subplot(grid[row, 1]), figure.add_subplot(grid[row, 2])
-        _draw_run(time_axes, run)
-        time_axes.set_title(f"{name}, from total rest: mean reward {run[3]:.2f}")
-        _, _, outputs, _ = run
-        draw_phase_plane(plane, outputs, target)
+        _draw_episode(time_axes, episode)
+        time_axes.set_title(f"{name}, from total rest: mean reward {episode.mean_reward:.2f}")
+        draw_phase_plane(plane, episode.outputs, target)
         plane.set_title(TITLES.get(target.name, target.name) if row == 0 else "")
         if row == 1:
             time_axes.set_xlabel("time [s]")
@@ -55,8 +54,8 @@ def _draw_learning(axes: Axes, rewards: Array, without: float) -> None:
     count_in_whole_numbers(axes)
 
 
-def _draw_run(axes: Axes, run: Run) -> None:
-    times, inputs, outputs, _ = run
+def _draw_episode(axes: Axes, episode: Episode) -> None:
+    times, inputs, outputs = episode.times, episode.inputs, episode.outputs
     for c in range(outputs.shape[1]):
         axes.plot(times, outputs[:, c], lw=1.2, **OUTPUT_STYLES[c % 2], label=f"$x_{c + 1}$")
     largest = np.abs(inputs).max()

@@ -1,19 +1,12 @@
 """The command: emulate."""
 
-from matplotlib.figure import Figure
 from rich.console import Console
 from rich.table import Table
 
 from mcmj.experiments.base import Experiment
-from mcmj.experiments.emulate.figure import emulation_figure
+from mcmj.experiments.emulate.figure import figures
 from mcmj.experiments.emulate.run import REPORTED, Config, Result, run
 from mcmj.utils.progress import progress_bar
-
-
-def figures(result: Result) -> dict[str, Figure]:
-    """Orbits, and error against step."""
-    figure = emulation_figure(result.orbits, result.cells, result.slopes, result.mismatch_errors)
-    return {"emulate": figure}
 
 
 def show(result: Result, console: Console) -> None:

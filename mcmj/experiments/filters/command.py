@@ -1,28 +1,12 @@
 """The command: filters."""
 
-from matplotlib.figure import Figure
 from rich.console import Console
 from rich.table import Table
 
 from mcmj.experiments.base import Experiment
-from mcmj.experiments.filters.figure import filter_figure, switch_figure
-from mcmj.experiments.filters.run import IN_SYMBOLS, TIMESTEP, Config, Result, run
+from mcmj.experiments.filters.figure import figures
+from mcmj.experiments.filters.run import Config, Result, run
 from mcmj.utils.progress import progress_bar
-
-
-def figures(result: Result) -> dict[str, Figure]:
-    """The filters; the switch."""
-    found = {}
-    if result.filters:
-        panels = {
-            name: (1.0 if name in IN_SYMBOLS else TIMESTEP, r.wanted, r.outputs, r.errors)
-            for name, r in result.filters.items()
-        }
-        found["filters"] = filter_figure(panels, in_symbols=IN_SYMBOLS)
-    if result.switch is not None:
-        s = result.switch
-        found["switch"] = switch_figure(TIMESTEP, s.task.inputs, s.task.targets, s.outputs, s.held)
-    return found
 
 
 def show(result: Result, console: Console) -> None:

@@ -3,13 +3,12 @@
 from pathlib import Path
 
 import numpy as np
-from matplotlib.figure import Figure
 from rich.console import Console
 from rich.table import Table
 
 from mcmj.experiments.base import Experiment
 from mcmj.experiments.gaits.config import Config, total_steps
-from mcmj.experiments.gaits.figure import gait_diagram, switch_figure
+from mcmj.experiments.gaits.figure import figures
 from mcmj.experiments.gaits.result import Result
 from mcmj.experiments.gaits.run import run
 from mcmj.mjcf.write import to_mjcf
@@ -36,30 +35,6 @@ def write(result: Result, out: Path) -> None:
     for (start, end), switch in first.switches.items():
         arrays[f"{start}_to_{end}/outputs"] = switch.outputs
     files.write_arrays(out / "trajectory.npz", arrays, config, config.first_seed)
-
-
-def figures(result: Result) -> dict[str, Figure]:
-    """The switches from the first gait in the manner of Fig. 9; the gait diagram."""
-    config, first = result.config, result.first
-    found = {}
-    switches = {
-        f"{start} to {end}": (
-            first.gaits[start].target, first.gaits[end].target,
-            switch.outputs, switch.switched, switch.time,
-        )
-        for (start, end), switch in first.switches.items()
-        if start == config.gaits[0] and len(switch.outputs)
-    }  # fmt: skip
-    if switches:
-        found["gaits"] = switch_figure(switches, config.timestep)
-    gaits = {
-        f"{name}, period {gait.target.period:.2f} s": (gait.target, gait.free.outputs)
-        for name, gait in first.gaits.items()
-        if len(gait.free.outputs)
-    }
-    if gaits:
-        found["gait_diagram"] = gait_diagram(gaits, switches, config.timestep)
-    return found
 
 
 def show(result: Result, console: Console) -> None:

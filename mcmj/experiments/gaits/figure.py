@@ -1,6 +1,6 @@
-"""Figures of gaits: outputs around a switch of the readout (Fig. 9 of the paper), gait diagrams."""
+"""Gaits: outputs around a switch of the readout (Fig. 9 of the paper), gait diagrams."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -8,43 +8,58 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
+from mcmj.experiments.gaits.result import BodyResult, Result
 from mcmj.metrics.gaits import in_stance
+from mcmj.pictures.footfalls import name_legs
 from mcmj.pictures.plotting import TARGET_STYLE, best_phase, new_figure
 from mcmj.targets.gaits import LEGS
-from mcmj.targets.limit_cycles import Target
 from mcmj.utils.colours import BLACK, CHANGE_COLOUR, RECOVERED_COLOUR, TARGET_COLOUR, Colour
 from mcmj.utils.validation import Array
 
 SPACING = 2.6  # between the legs' outputs, which are within +-1.1
 THIN = 10  # one sample in so many is drawn
 BAR = 0.36  # height of a stance bar
-Switch = tuple[Target, Target, Array, int, float]
+SHOWN = 12.0  # seconds of each gait in the diagram
+Pair = tuple[str, str]  # of the gaits before and after a switch
 
 
-def switch_figure(switches: Mapping[str, Switch], timestep: float) -> Figure:
+def figures(result: Result) -> dict[str, Figure]:
+    """By file name: the first body's switches from the first gait; its gait diagram."""
+    first, step, found = result.first, result.config.timestep, {}
+    pairs = [
+        pair
+        for pair, switch in first.switches.items()
+        if pair[0] == result.config.gaits[0] and len(switch.outputs)
+    ]
+    if pairs:
+        found["gaits"] = switch_figure(first, pairs, step)
+    if any(len(gait.free.outputs) for gait in first.gaits.values()):
+        found["gait_diagram"] = gait_diagram(first, pairs, step)
+    return found
+
+
+def switch_figure(body: BodyResult, pairs: Sequence[Pair], timestep: float) -> Figure:
     """Fig. 9: the four outputs around each switch, on the target before it and the one after.
 
     Args:
-        switches: by title: target before, target after, outputs (T, 4), row of the switch,
-            switching time [s].
         timestep: of the outputs [s].
     """
-    figure = new_figure(11.0, 2.9 * len(switches) + 0.5)
-    column = figure.subplots(len(switches), 1, squeeze=False)[:, 0]
-    for (title, switch), axes in zip(switches.items(), column, strict=True):
-        _, after, outputs, row, arrival = switch
-        times = _times(outputs, row, timestep)
-        first, last = _shown(after, times, arrival)
+    figure = new_figure(11.0, 2.9 * len(pairs) + 0.5)
+    column = figure.subplots(len(pairs), 1, squeeze=False)[:, 0]
+    for pair, axes in zip(pairs, column, strict=True):
+        switch = body.switches[pair]
+        times = _times(switch.outputs, switch.switched, timestep)
+        first, last = _shown(body, pair, times)
         rows = slice(np.searchsorted(times, first), np.searchsorted(times, last), THIN)
         levels = SPACING * np.arange(len(LEGS))[::-1]
-        for wanted_times, wanted in _targets(switch, timestep):
+        for wanted_times, wanted in _targets(body, pair, timestep):
             seen = (wanted_times >= first) & (wanted_times <= last)
             axes.plot(wanted_times[seen], wanted[seen] + levels, **TARGET_STYLE)
-        axes.plot(times[rows], outputs[rows] + levels, color="black", lw=1.1)
+        axes.plot(times[rows], switch.outputs[rows] + levels, color="black", lw=1.1)
         axes.set_yticks(levels, LEGS)
         axes.set(xlim=(first, last), ylabel="output of leg")
-        axes.set_title(f"{title}: {_when(arrival)}")
-        _mark(axes, arrival)
+        axes.set_title(_title(body, pair))
+        _mark(axes, switch.time)
     column[-1].set_xlabel("time after the switch of the readout [s]")
     figure.legend(
         handles=[
@@ -57,48 +72,39 @@ def switch_figure(switches: Mapping[str, Switch], timestep: float) -> Figure:
     return figure
 
 
-def gait_diagram(
-    gaits: Mapping[str, tuple[Target, Array]],
-    switches: Mapping[str, Switch],
-    timestep: float,
-    *,
-    shown: float = 12.0,
-) -> Figure:
+def gait_diagram(body: BodyResult, pairs: Sequence[Pair], timestep: float) -> Figure:
     """Stance bars of each leg: the gaits beside their targets, and around switches.
 
     Args:
-        gaits: by title: target, outputs (T, 4) on it.
-        switches: as for switch_figure.
         timestep: of the outputs [s].
-        shown: time of each gait [s].
     """
+    gaits = {name: gait for name, gait in body.gaits.items() if len(gait.free.outputs)}
     wide = -(-len(gaits) // 2)
-    figure = new_figure(12.0, 1.75 * (wide + len(switches)) + 0.8)
-    grid = figure.add_gridspec(wide + len(switches), 2)
-    for place, (title, (target, outputs)) in enumerate(gaits.items()):
+    figure = new_figure(12.0, 1.75 * (wide + len(pairs)) + 0.8)
+    grid = figure.add_gridspec(wide + len(pairs), 2)
+    for place, (name, gait) in enumerate(gaits.items()):
         axes = figure.add_subplot(grid[place // 2, place % 2])
-        last = outputs[-round(shown / timestep) :]
+        last, target = gait.free.outputs[-round(SHOWN / timestep) :], gait.target
         times = _times(last, 0, timestep)
         wanted = target.sample(times + best_phase(last, target, times))
         _bars(axes, times, wanted, TARGET_COLOUR, below=True)
         _bars(axes, times, last, BLACK)
-        _legs(axes, title, (0.0, shown))
+        _legs(axes, f"{name}, period {target.period:.2f} s", (0.0, SHOWN))
         axes.set_xlabel("time [s]" if place >= len(gaits) - 2 else "")
-    for place, (title, switch) in enumerate(switches.items()):
-        axes = figure.add_subplot(grid[wide + place, :])
-        _, after, outputs, row, arrival = switch
-        times = _times(outputs, row, timestep)
-        for wanted_times, wanted in _targets(switch, timestep):
+    for place, pair in enumerate(pairs):
+        axes, switch = figure.add_subplot(grid[wide + place, :]), body.switches[pair]
+        times = _times(switch.outputs, switch.switched, timestep)
+        for wanted_times, wanted in _targets(body, pair, timestep):
             _bars(axes, wanted_times, wanted, TARGET_COLOUR, below=True)
-        _bars(axes, times, outputs, BLACK)
-        _legs(axes, f"{title}: {_when(arrival)}", _shown(after, times, arrival))
-        _mark(axes, arrival)
-    if switches:
+        _bars(axes, times, switch.outputs, BLACK)
+        _legs(axes, _title(body, pair), _shown(body, pair, times))
+        _mark(axes, switch.time)
+    if pairs:
         figure.axes[-1].set_xlabel("time after the switch of the readout [s]")
     handles = [
         Patch(color="black", label="stance (output falls)"),
         Patch(color=TARGET_COLOUR, alpha=0.55, label="target's stance"),
-        *(_mark_handles() if switches else ()),
+        *(_mark_handles() if pairs else ()),
     ]
     figure.legend(handles=handles, loc="outside upper center", ncols=4, frameon=False)
     return figure
@@ -109,18 +115,20 @@ def _times(outputs: Array, origin: int, timestep: float) -> Array:
     return np.arange(-origin, len(outputs) - origin, dtype=np.float64) * timestep
 
 
-def _shown(after: Target, times: Array, arrival: float) -> tuple[float, float]:
+def _shown(body: BodyResult, pair: Pair, times: Array) -> tuple[float, float]:
     """Times around a switch that are drawn: two periods before, and until well after arrival."""
-    end = arrival + 3 * after.period if np.isfinite(arrival) else np.inf
-    return max(times[0], -2 * after.period), min(times[-1], max(end, 6 * after.period))
+    arrival, period = body.switches[pair].time, body.gaits[pair[1]].target.period
+    end = arrival + 3 * period if np.isfinite(arrival) else np.inf
+    return max(times[0], -2 * period), min(times[-1], max(end, 6 * period))
 
 
-def _targets(switch: Switch, timestep: float) -> list[tuple[Array, Array]]:
+def _targets(body: BodyResult, pair: Pair, timestep: float) -> list[tuple[Array, Array]]:
     """Times and values of the target before a switch, and of the one after, in best phase.
 
     The first is fitted to the outputs before the switch, the second to the last periods.
     """
-    before, after, outputs, row, _ = switch
+    before, after = (body.gaits[name].target for name in pair)
+    outputs, row = body.switches[pair].outputs, body.switches[pair].switched
     parts = []
     for target, begin, end, fitted in (
         (before, 0, row, slice(max(0, row - round(2 * before.period / timestep)), row)),
@@ -147,15 +155,14 @@ def _bars(axes: Axes, times: Array, outputs: Array, colour: Colour, *, below: bo
 
 
 def _legs(axes: Axes, title: str, limits: Sequence[float]) -> None:
-    axes.set_yticks(np.arange(len(LEGS))[::-1], LEGS)
-    axes.set(xlim=limits, ylim=(-0.6, len(LEGS) - 0.4))
-    axes.set_title(title)
-    axes.spines[["left", "right", "top"]].set_visible(False)
-    axes.tick_params(axis="y", length=0)
+    name_legs(axes)
+    axes.set(xlim=limits, ylim=(-0.6, len(LEGS) - 0.4), title=title)
 
 
-def _when(arrival: float) -> str:
-    return f"on the new orbit after {arrival:.1f} s" if np.isfinite(arrival) else "does not arrive"
+def _title(body: BodyResult, pair: Pair) -> str:
+    arrival = body.switches[pair].time
+    when = f"on the new orbit after {arrival:.1f} s" if np.isfinite(arrival) else "does not arrive"
+    return f"{pair[0]} to {pair[1]}: {when}"
 
 
 def _mark(axes: Axes, arrival: float) -> None:

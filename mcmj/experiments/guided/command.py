@@ -3,13 +3,12 @@
 from pathlib import Path
 from typing import Any
 
-from matplotlib.figure import Figure
 from rich.console import Console
 from rich.table import Table
 
 from mcmj.experiments.base import Experiment
+from mcmj.experiments.guided.figure import figures
 from mcmj.experiments.guided.run import Config, OnSetting, Result, run
-from mcmj.experiments.search.figure import guided_figure
 from mcmj.metrics.success_rates import rate_cells
 from mcmj.utils.progress import trial_bar
 
@@ -17,19 +16,6 @@ from mcmj.utils.progress import trial_bar
 def resume(config: Config, folder: Path, on_steps: OnSetting) -> Result:
     """The search, its store in the folder."""
     return run(config, folder=folder, on_setting=on_steps)
-
-
-def figures(result: Result) -> dict[str, Figure]:
-    """What was tried, and how the best does on other bodies."""
-    config = result.config
-    figure = guided_figure(
-        [objective for _, objective in result.tried],
-        result.judged,
-        config.threshold,
-        names=(config.objective, config.target.name),
-        maximise=(config.large_is_good, config.maximise),
-    )
-    return {"guided": figure}
 
 
 def show(result: Result, console: Console) -> None:

@@ -4,12 +4,11 @@ import csv
 import io
 from pathlib import Path
 
-from matplotlib.figure import Figure
 from rich.console import Console
 from rich.table import Table
 
 from mcmj.experiments.base import Experiment
-from mcmj.experiments.hard_cases.figure import step_figure
+from mcmj.experiments.hard_cases.figure import figures
 from mcmj.experiments.hard_cases.run import LONGEST, STEPS, Config, Result, Row, run
 from mcmj.utils import files
 from mcmj.utils.progress import progress_bar
@@ -18,11 +17,6 @@ from mcmj.utils.progress import progress_bar
 def write(result: Result, folder: Path) -> None:
     """All steps as a table."""
     files.write_text(folder / "hard_cases.csv", to_csv(result))
-
-
-def figures(result: Result) -> dict[str, Figure]:
-    """The largest stable steps."""
-    return {"hard_cases": step_figure(result.steps)}
 
 
 def to_csv(result: Result) -> str:

@@ -1,10 +1,9 @@
-"""The figure of scripts/hard_cases.py: stable steps, measured and predicted."""
-
-from collections.abc import Mapping
+"""Stable steps, measured and predicted."""
 
 import numpy as np
 from matplotlib.figure import Figure
 
+from mcmj.experiments.hard_cases.run import STEPS, Result
 from mcmj.pictures.plotting import new_figure
 from mcmj.utils.colours import BLACK, BLUE, GREEN, TARGET_COLOUR
 
@@ -12,17 +11,21 @@ PLAIN_STEP = 1e-3  # s: what a simulation takes unless told otherwise
 TOP = 2.0  # s: unbounded steps are drawn here
 
 
-def step_figure(steps: Mapping[str, Mapping[str, tuple[float, float, float, float]]]) -> Figure:
-    """One panel an integrator, one row a case.
+def figures(result: Result) -> dict[str, Figure]:
+    """By file name."""
+    return {"hard_cases": step_figure(result)}
 
-    Args:
-        steps: integrator -> case -> (measured, at rest, safe, blow-up) [s].
-    """
-    figure = new_figure(2.2 * len(steps) + 1.8, 4.6)
-    axes = figure.subplots(1, len(steps), sharex=True, sharey=True, squeeze=False)[0]
-    for panel, (integrator, cases) in zip(axes, steps.items(), strict=True):
-        rows = np.arange(len(cases))
-        measured, at_rest, safe, blow_up = np.minimum(np.array(list(cases.values())).T, TOP)
+
+def step_figure(result: Result) -> Figure:
+    """One panel an integrator, one row a case."""
+    integrators, cases = result.config.integrators, result.config.cases
+    figure = new_figure(2.2 * len(integrators) + 1.8, 4.6)
+    axes = figure.subplots(1, len(integrators), sharex=True, sharey=True, squeeze=False)[0]
+    rows = np.arange(len(cases))
+    for panel, integrator in zip(axes, integrators, strict=True):
+        found = [row for row in result.rows if row.integrator == integrator]
+        steps = np.array([[getattr(row, name) for row in found] for name in STEPS])
+        measured, at_rest, safe, blow_up = np.minimum(steps, TOP)
         panel.hlines(rows, safe, blow_up, color=BLUE, alpha=0.35, lw=6,
                      label="predicted in motion: safe to blow-up")  # fmt: skip
         panel.plot(at_rest, rows, "|", color=GREEN, ms=11, mew=2,

@@ -101,18 +101,6 @@ class Result:
     amplitudes: dict[str, tuple[float, float]]
 
     @property
-    def steps(self) -> dict[str, dict[str, tuple[float, float, float, float]]]:
-        """integrator -> case -> (measured, at rest, safe, blow-up) [s]."""
-        return {
-            integrator: {
-                row.case: (row.measured, row.at_rest, row.safe, row.blow_up)
-                for row in self.rows
-                if row.integrator == integrator
-            }
-            for integrator in self.config.integrators
-        }
-
-    @property
     def metrics(self) -> dict[str, object]:
         """metrics.<case>.<integrator>: steps in ms, and how they compare; null: unbounded."""
         table: dict[str, object] = {}

@@ -2,14 +2,12 @@
 
 from pathlib import Path
 
-import numpy as np
-from matplotlib.figure import Figure
 from rich.console import Console
 from rich.table import Table
 
 from mcmj.experiments.base import Experiment
 from mcmj.experiments.input_driven.config import Config, total_steps
-from mcmj.experiments.input_driven.figure import input_curves_figure, jumps_figure
+from mcmj.experiments.input_driven.figure import figures
 from mcmj.experiments.input_driven.run import Result, run
 from mcmj.mjcf.write import to_mjcf
 from mcmj.utils import files
@@ -22,14 +20,6 @@ def write(result: Result, folder: Path) -> None:
     files.write_text(folder / "body.xml", body_file(result))
     arrays = {f"eps_{u:g}/outputs": held.outputs for u, held in result.first.held.items()}
     files.write_arrays(folder / "trajectory.npz", arrays, config, config.seed)
-
-
-def figures(result: Result) -> dict[str, Figure]:
-    """Figs. 10 and 11."""
-    config, held = result.config, result.first.held
-    runs = {u: (held[u].target, held[u].outputs, held[u].orbit_error) for u in config.inputs}
-    jumps = jumps_figure(runs, config.timestep, config.course.last)
-    return {"input_curves": curves(result), "input_jumps": jumps}
 
 
 def body_file(result: Result) -> str:
@@ -45,17 +35,6 @@ def body_file(result: Result) -> str:
         readouts=result.readouts,
         provenance={"body": start.source, "taught_inputs": start.taught, "lessons": lessons},
     )
-
-
-def curves(result: Result) -> Figure:
-    """Fig. 10 from the first body's runs."""
-    first = result.first
-    inputs, runs = np.array(list(first.held)), list(first.held.values())
-    target = np.array([(h.target_amplitude, 1.0 / h.target.period) for h in runs]).T
-    held = np.array([(h.amplitude, h.frequency) for h in runs]).T
-    branches = first.sweep.body if first.sweep else ()
-    sweep = [(b.inputs, b.amplitudes, b.frequencies) for b in branches]
-    return input_curves_figure((inputs, *target), (inputs, *held), sweep, first.start.taught)
 
 
 def show(result: Result, console: Console) -> None:

@@ -4,18 +4,17 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from matplotlib.figure import Figure
 from rich.console import Console
 from rich.table import Table
 
 from mcmj.core.random_body import draw_body
 from mcmj.experiments.base import Experiment
 from mcmj.experiments.limit_cycle.config import Config, total_steps
+from mcmj.experiments.limit_cycle.figure import figures
 from mcmj.experiments.limit_cycle.run import Result, run
 from mcmj.experiments.limit_cycle.seeds import SuccessOfSeeds
 from mcmj.metrics.success_rates import rate_cells
 from mcmj.mjcf.write import to_mjcf
-from mcmj.pictures import plotting
 from mcmj.pictures.rendering import limit_cycle_video
 from mcmj.utils import files
 from mcmj.utils.progress import progress_bar
@@ -56,23 +55,6 @@ def best_body(config: Config, seeds: SuccessOfSeeds) -> str:
         "versions": files.versions(),
     }
     return to_mjcf(draw_body(seed, config.settings), provenance=provenance)
-
-
-def figures(result: Result) -> dict[str, Figure]:
-    """Fig. 5; the errors of all bodies."""
-    found = {}
-    if result.seeds is not None:
-        errors, threshold = result.seeds.orbit_errors, result.config.threshold
-        found["success_rate"] = plotting.success_figure(errors, threshold)
-    if not result.tasks:
-        return found
-    found["limit_cycle"] = plotting.limit_cycle_figure(
-        result.body,
-        [(task.target, task.times, task.outputs, task.errors) for task in result.tasks.values()],
-        free_run=result.config.free_run,
-        window=result.config.window,
-    )
-    return found
 
 
 def write_videos(result: Result, out: Path) -> None:

@@ -2,12 +2,11 @@
 
 from pathlib import Path
 
-from matplotlib.figure import Figure
 from rich.console import Console
 from rich.table import Table
 
 from mcmj.experiments.base import Experiment
-from mcmj.experiments.emulate.figure import diversity_figure
+from mcmj.experiments.linearise.figure import figures
 from mcmj.experiments.linearise.run import Config, Result, run, total_arrays
 from mcmj.utils import files
 from mcmj.utils.progress import progress_bar
@@ -16,18 +15,6 @@ from mcmj.utils.progress import progress_bar
 def write(result: Result, folder: Path) -> None:
     """The reports on linearisability."""
     files.write_text(folder / "linearisability.txt", report(result))
-
-
-def figures(result: Result) -> dict[str, Figure]:
-    """What diversity is worth."""
-    figure = diversity_figure(
-        result.config.diversities,
-        {n: c[:-1] for n, c in result.conditions.items()},
-        {n: r[:-1] for n, r in result.ranks.items()},
-        {n: e[:-1] for n, e in result.errors.items()},
-        {n: e[-1] for n, e in result.errors.items()},
-    )
-    return {"linearise": figure}
 
 
 def report(result: Result) -> str:

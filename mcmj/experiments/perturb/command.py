@@ -2,13 +2,11 @@
 
 from pathlib import Path
 
-import numpy as np
-from matplotlib.figure import Figure
 from rich.console import Console
 from rich.table import Table
 
 from mcmj.experiments.base import Experiment
-from mcmj.experiments.perturb.figure import perturb_figure, tolerance_figure
+from mcmj.experiments.perturb.figure import figures
 from mcmj.experiments.perturb.run import Config, Result, run, total_steps
 from mcmj.utils import files
 from mcmj.utils.progress import progress_bar
@@ -19,21 +17,6 @@ def write(result: Result, folder: Path) -> None:
     config, first = result.config, result.bodies[0]
     arrays = {f"{name}/outputs": r.outputs for name, r in first.recoveries.items()}
     files.write_arrays(folder / "trajectory.npz", arrays, config, config.seed)
-
-
-def figures(result: Result) -> dict[str, Figure]:
-    """Fig. 6 of the first body; noise tolerance of all."""
-    config = result.config
-    runs = {
-        name: (r.times, r.outputs, r.clean, r.boundaries, r.orbit_error, r.recovery_time)
-        for name, r in result.bodies[0].recoveries.items()
-    }
-    found = {"perturb": perturb_figure(result.target, runs)}
-    if config.noise_curve:
-        errors = np.array([body.noise_errors for body in result.bodies])
-        figure = tolerance_figure(config.noise_curve, errors, config.tolerance)
-        found["noise_tolerance"] = figure
-    return found
 
 
 def show(result: Result, console: Console) -> None:

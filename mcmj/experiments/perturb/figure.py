@@ -1,23 +1,14 @@
-"""Figures of disturbed rhythms, in the manner of the paper's Figs. 6 and 7."""
-
-from collections.abc import Mapping, Sequence
+"""Disturbed rhythms, in the manner of the paper's Fig. 6; and how much noise is too much."""
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from mcmj.pictures.plotting import (
-    OUTPUT_STYLES,
-    TARGET_STYLE,
-    TITLES,
-    draw_orbit,
-    new_figure,
-    output_handles,
-)
+from mcmj.experiments.perturb.run import Recovery, Result
+from mcmj.pictures.plotting import OUTPUT_STYLES, TARGET_STYLE, draw_orbit, new_figure
 from mcmj.targets.limit_cycles import Target
 from mcmj.utils.colours import BLACK, CHANGE_COLOUR, RECOVERED_COLOUR, TARGET_COLOUR
-from mcmj.utils.validation import Array
 
 PHASE_COLOURS = (BLACK, CHANGE_COLOUR, RECOVERED_COLOUR)  # undisturbed, disturbed, free again
 PHASE_NAMES = ("undisturbed", "disturbed", "free again")
@@ -27,27 +18,32 @@ NAMES = {
     "random_forces": "Constant random forces on all nodes",
     "length_noise": "White noise on all lengths",
 }
-Run = tuple[Array, Array, Array, Sequence[int], float, float]
+SHOWN = 15.0  # s: the free run after the disturbance is drawn for this long at least
 
 
-def perturb_figure(target: Target, runs: Mapping[str, Run], *, shown: float = 15.0) -> Figure:
+def figures(result: Result) -> dict[str, Figure]:
+    """By file name: Fig. 6 of the first body; noise tolerance of all."""
+    found = {"perturb": perturb_figure(result)}
+    if result.config.noise_curve:
+        found["noise_tolerance"] = tolerance_figure(result)
+    return found
+
+
+def perturb_figure(result: Result) -> Figure:
     """Fig. 6: one row a perturbation; outputs over time, and the phase plane in the same colours.
 
-    Args:
-        runs: by name: times (T,) [s], outputs (T, 2) as fed back, outputs (T, 2) without
-            noise, boundaries of the three phases (rows), orbit error, recovery time [s].
-            Where outputs are noisy they are drawn pale, those without noise on top.
-        shown: the free run after the disturbance is drawn for this long at least [s].
+    Where outputs are noisy they are drawn pale, those without noise on top.
     """
+    runs = result.bodies[0].recoveries
     figure = new_figure(12.0, 2.7 * len(runs) + 0.6)
     axes = figure.subplots(len(runs), 2, width_ratios=[3.0, 1.0], squeeze=False)
     for (name, run), (time_axes, plane) in zip(runs.items(), axes, strict=True):
         noisy = name == "length_noise"
-        _draw_run(time_axes, plane, target, run, shown, noisy=noisy)
-        *_, error, recovery = run
+        _draw_run(time_axes, plane, result.target, run, noisy=noisy)
+        recovery = run.recovery_time
         back = f"back after {recovery:.1f} s" if np.isfinite(recovery) else "not back"
         time_axes.set_title(f"{NAMES.get(name, name)}: {back}")
-        plane.set_title(f"orbit error in the end {100 * error:.2f} %")
+        plane.set_title(f"orbit error in the end {100 * run.orbit_error:.2f} %")
     axes[-1, 0].set_xlabel("time in closed loop [s]")
     phases = zip(PHASE_COLOURS, PHASE_NAMES, strict=True)
     handles = [
@@ -61,11 +57,9 @@ def perturb_figure(target: Target, runs: Mapping[str, Run], *, shown: float = 15
     return figure
 
 
-def _draw_run(
-    time_axes: Axes, plane: Axes, target: Target, run: Run, shown: float, *, noisy: bool
-) -> None:
-    times, fed, clean, boundaries, _, recovery = run
-    outputs = clean if noisy else fed
+def _draw_run(time_axes: Axes, plane: Axes, target: Target, run: Recovery, *, noisy: bool) -> None:
+    times, fed, boundaries, recovery = run.times, run.outputs, run.boundaries, run.recovery_time
+    outputs = run.clean if noisy else fed
     draw_orbit(plane, target)
     time_axes.set(ylabel="outputs")
     time_axes.margins(y=0.08)
@@ -84,12 +78,14 @@ def _draw_run(
             plane.plot(*outputs[rows, :2].T, color=colour, lw=0.7)
         if np.isfinite(recovery):
             time_axes.axvline(end + recovery, color=RECOVERED_COLOUR, lw=1, ls=":")
-        last_shown = end + max(shown, 1.3 * recovery if np.isfinite(recovery) else 0.0)
+        last_shown = end + max(SHOWN, 1.3 * recovery if np.isfinite(recovery) else 0.0)
         time_axes.set_xlim(times[0], min(times[-1], last_shown))
 
 
-def tolerance_figure(amplitudes: Sequence[float], errors: Array, tolerance: float) -> Figure:
-    """Orbit error after 10 s of length noise against its amplitude; errors (bodies, amplitudes)."""
+def tolerance_figure(result: Result) -> Figure:
+    """Orbit error after some time of length noise against its amplitude, a line a body."""
+    amplitudes, tolerance = result.config.noise_curve, result.config.tolerance
+    errors = np.array([body.noise_errors for body in result.bodies])
     figure = new_figure(7.0, 4.0)
     axes = figure.add_subplot()
     capped = np.minimum(errors, 2.0)  # everything worse, blow-ups too, is drawn here
@@ -104,42 +100,4 @@ def tolerance_figure(amplitudes: Sequence[float], errors: Array, tolerance: floa
     axes.set_title(f"bodies that recover, of {len(errors)}", pad=16)
     axes.legend(frameon=False)
     axes.grid(alpha=0.3)
-    return figure
-
-
-def swing_up_figure(runs: Mapping[str, tuple[Target, float, Array, float, float]]) -> Figure:
-    """Fig. 7: from rest onto the orbit; outputs over time and the phase plane, a row a task.
-
-    Args:
-        runs: by task: target, timestep [s], outputs (T, 2), orbit error, swing-up time [s].
-    """
-    figure = new_figure(12.0, 2.7 * len(runs) + 0.5)
-    axes = figure.subplots(len(runs), 2, width_ratios=[3.0, 1.0], squeeze=False)
-    for (name, run), (time_axes, plane) in zip(runs.items(), axes, strict=True):
-        target, timestep, outputs, error, swing_up = run
-        times = timestep * np.arange(len(outputs))
-        draw_orbit(plane, target)
-        arrived = np.isfinite(swing_up)
-        end = max(20.0, 1.5 * swing_up) if arrived else np.inf
-        rows = times <= end
-        for c in range(outputs.shape[1]):
-            time_axes.plot(times[rows], outputs[rows, c], lw=1.2, **OUTPUT_STYLES[c % 2])
-        plane.plot(*outputs[rows, :2].T, color="black", lw=0.8)
-        if len(times):
-            plane.plot(*outputs[0, :2], "o", color=CHANGE_COLOUR, ms=6)
-        if arrived:
-            time_axes.axvline(swing_up, color=CHANGE_COLOUR, lw=1.2, ls=":")
-        when = f"on the orbit after {swing_up:.1f} s" if arrived else "does not arrive"
-        time_axes.set_title(f"{TITLES.get(name, name)}, from total rest: {when}")
-        time_axes.set(ylabel="outputs")
-        time_axes.margins(x=0)
-        time_axes.locator_params(axis="x", nbins=8)
-        plane.set_title(f"orbit error in the end {100 * error:.2f} %")
-    axes[-1, 0].set_xlabel("time in closed loop [s]")
-    handles = [
-        *output_handles(2),
-        Line2D([], [], color=CHANGE_COLOUR, marker="o", ls="", label="at rest"),
-        Line2D([], [], color=CHANGE_COLOUR, lw=1.2, ls=":", label="on the orbit from here on"),
-    ]
-    figure.legend(handles=handles, loc="outside upper center", ncols=5, frameon=False)
     return figure

@@ -3,13 +3,12 @@
 from pathlib import Path
 
 import numpy as np
-from matplotlib.figure import Figure
 from rich.console import Console
 from rich.table import Table
 
 from mcmj.experiments.base import Experiment
+from mcmj.experiments.prune.figure import figures
 from mcmj.experiments.prune.run import Config, Result, run, total_runs
-from mcmj.experiments.search.figure import pruning_figure
 from mcmj.utils import files
 from mcmj.utils.progress import progress_bar
 
@@ -20,21 +19,6 @@ def write(result: Result, folder: Path) -> None:
     arrays = {f"{m}/errors": result.errors(m) for m in config.methods}
     arrays |= {f"{m}/order": first.orders[m] for m in config.methods}
     files.write_arrays(folder / "prune.npz", arrays, config, config.of_seed(0).noise_seed)
-
-
-def figures(result: Result) -> dict[str, Figure]:
-    """Errors against springs sensed."""
-    config, first = result.config, result.bodies[0]
-    method = config.methods[0]
-    figure = pruning_figure(
-        config.counts,
-        {m: result.errors(m) for m in config.methods},
-        np.array([body.full_error for body in result.bodies]),
-        config.threshold,
-        body=first.body,
-        sensed=first.orders[method][: result.needed(method, 0) or 0],
-    )
-    return {"prune": figure}
 
 
 def show(result: Result, console: Console) -> None:
@@ -53,7 +37,7 @@ def show(result: Result, console: Console) -> None:
             cells += [f"{good} of {len(errors)}", f"{100 * np.median(errors):.3g} %"]
         table.add_row(*cells)
     console.print(table)
-    full = np.array([body.full_error for body in result.bodies])
+    full = result.full_errors
     console.print(
         f"all springs: {int((full < config.threshold).sum())} of {len(full)}, "
         f"median error {100 * np.median(full):.3g} %"

@@ -102,6 +102,11 @@ class Result:
     config: Config
     bodies: list[Pruned]
 
+    @property
+    def full_errors(self) -> Array:
+        """(bodies,) with all springs."""
+        return np.array([body.full_error for body in self.bodies])
+
     def errors(self, method: str) -> Array:
         """(bodies, counts)."""
         return np.array([body.errors[method] for body in self.bodies])
@@ -123,7 +128,7 @@ class Result:
         table: dict[str, object] = {
             "counts": self.config.counts,
             "springs": [one.body.n_springs for one in self.bodies],
-            "full_errors": [one.full_error for one in self.bodies],
+            "full_errors": self.full_errors,
         }
         for method in self.config.methods:
             errors = self.errors(method)

@@ -3,16 +3,14 @@
 from contextlib import suppress
 from pathlib import Path
 
-import numpy as np
-from matplotlib.figure import Figure
 from rich.console import Console
 from rich.table import Table
 
 from mcmj.experiments.base import Experiment
-from mcmj.experiments.search.figure import best_bodies_figure, score_figure, success_rate_figure
+from mcmj.experiments.search.figure import figures
+from mcmj.experiments.search.result import short
 from mcmj.experiments.search.run import Config, OnTrial, Result, run, total_trials
 from mcmj.metrics.success_rates import rate_cells
-from mcmj.mjcf.read import from_mjcf
 from mcmj.search.database import TrialStore
 from mcmj.search.export import write_csv, write_parquet
 from mcmj.utils import files
@@ -40,49 +38,6 @@ def write(result: Result, folder: Path) -> None:
             write_parquet(kept, folder / "trials.parquet")
 
 
-def figures(result: Result) -> dict[str, Figure]:
-    """Success rates by setting, scores, the best bodies."""
-    config, found = result.config, {}
-    if result.by_setting:
-        found["success_rate"] = success_rate_figure(result.by_setting)
-    found["scores"] = score_figure(
-        groups(result), config.threshold, name=config.target.name, maximise=config.maximise
-    )
-    if result.bodies:
-        titles = [title(result, int(index)) for index in result.ranking]
-        bodies = [from_mjcf(xml)[0] for xml in result.bodies]
-        found["best_bodies"] = best_bodies_figure(list(zip(bodies, titles, strict=False)))
-    return found
-
-
-def groups(result: Result) -> dict[str, np.ndarray]:
-    """Scores by what tells most: the settings if they are few, else the parts of the score."""
-    if 1 < len(result.settings) <= 6:
-        return {label(s): x for s, x in zip(result.settings, result.scores, strict=True)}
-    if len(result.parts) > 1:
-        parts = {result.config.target.label(path): x.ravel() for path, x in result.parts.items()}
-        return {**parts, "the worst of them": result.scores.ravel()}
-    return {"all trials": result.scores.ravel()}
-
-
-def label(setting: dict[str, object]) -> str:
-    """A setting in a few words."""
-    return ", ".join(f"{path.rpartition('.')[2]} {short(value)}" for path, value in setting.items())
-
-
-def short(value: object) -> str:
-    """Three digits."""
-    return f"{value:.3g}" if isinstance(value, float) else str(value)
-
-
-def title(result: Result, index: int) -> str:
-    """What a body is called in figures and tables."""
-    row = result.describe(index)
-    score = row["score"] if row["confirmed_score"] is None else row["confirmed_score"]
-    where = label(result.settings[index // result.config.seeds])
-    return f"seed {row['seed']}: {short(score)}" + (f" ({where})" if where else "")
-
-
 def show(result: Result, console: Console) -> None:
     """The result as tables."""
     config, metrics, console = result.config, result.metrics, Console()
@@ -97,7 +52,7 @@ def show(result: Result, console: Console) -> None:
     for name, value, row in rows:
         table.add_row(name, value, *rate_cells(row))
     console.print(table)
-    best = [title(result, int(index)) for index in result.ranking[: config.best]]
+    best = [result.title(int(index)) for index in result.ranking[: config.best]]
     if best:
         console.print("best: " + "; ".join(best))
     speed = metrics["trials_per_second"]

@@ -1,4 +1,4 @@
-"""Figures of searches and of pruned readouts. Takes results, never simulates."""
+"""Searches: success rates by setting, scores, the best bodies."""
 
 import json
 from collections.abc import Mapping, Sequence
@@ -6,23 +6,28 @@ from typing import Any
 
 import matplotlib as mpl
 import numpy as np
-import numpy.typing as npt
 from matplotlib.axes import Axes
-from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullFormatter
 
-from mcmj.core.body import Body
+from mcmj.experiments.search.result import Result, setting_label
+from mcmj.mjcf.read import from_mjcf
 from mcmj.pictures.plotting import TITLES, count_in_whole_numbers, draw_body, new_figure
+from mcmj.search.experiment import Score
 from mcmj.utils.colours import GROUP_COLOURS, TARGET_COLOUR
 from mcmj.utils.validation import Array
 
-_ORDERS = {
-    "backward": "backward elimination",
-    "forward": "forward selection",
-    "random": "random order",
-}
 _LOG_FROM = 30.0  # largest over smallest value from which an axis is logarithmic
+
+
+def figures(result: Result) -> dict[str, Figure]:
+    """By file name."""
+    found = {"scores": score_figure(result)}
+    if result.by_setting:
+        found["success_rate"] = success_rate_figure(result.by_setting)
+    if result.bodies:
+        found["best_bodies"] = best_bodies_figure(result)
+    return found
 
 
 def success_rate_figure(tables: Mapping[str, Sequence[Mapping[str, Any]]]) -> Figure:
@@ -73,25 +78,31 @@ def _draw_rates(axes: Axes, table: Sequence[Mapping[str, Any]]) -> None:
         count_in_whole_numbers(axes)
 
 
-def score_figure(
-    groups: Mapping[str, Array], threshold: float, *, name: str, maximise: bool = False
-) -> Figure:
+def score_figure(result: Result) -> Figure:
     """Cumulative distributions of scores; see `draw_scores`."""
     figure = new_figure(6.6, 4.2)
-    draw_scores(figure.add_subplot(), groups, threshold, name=name, maximise=maximise)
+    draw_scores(figure.add_subplot(), _groups(result), result.config.target)
     return figure
 
 
-def draw_scores(
-    axes: Axes, groups: Mapping[str, Array], threshold: float, *, name: str, maximise: bool = False
-) -> None:
+def _groups(result: Result) -> dict[str, Array]:
+    """Scores by what tells most: the settings if they are few, else the parts of the score."""
+    if 1 < len(result.settings) <= 6:
+        return {setting_label(s): x for s, x in zip(result.settings, result.scores, strict=True)}
+    if len(result.parts) > 1:
+        parts = {result.config.target.label(path): x.ravel() for path, x in result.parts.items()}
+        return {**parts, "the worst of them": result.scores.ravel()}
+    return {"all trials": result.scores.ravel()}
+
+
+def draw_scores(axes: Axes, groups: Mapping[str, Array], target: Score) -> None:
     """Cumulative distributions of scores, one curve a group; blow-ups never come in.
 
     Args:
         groups: scores by label; infinite where a body blew up.
-        threshold: of a success.
-        name: of the score.
+        target: the score, and from where on it is a success.
     """
+    threshold, maximise = target.threshold, target.maximise
     for (label, scores), colour in zip(groups.items(), _colours(len(groups)), strict=True):
         finite = np.sort(scores[np.isfinite(scores)])
         good = int(((scores > threshold) if maximise else (scores < threshold)).sum())
@@ -105,7 +116,7 @@ def draw_scores(
     axes.axvline(
         threshold, color=TARGET_COLOUR, ls="--", lw=1, label=f"success {side} {threshold:g}"
     )
-    axes.set(xlabel=name, ylabel="share of the bodies with less", ylim=(0, 1.02))
+    axes.set(xlabel=target.name, ylabel="share of the bodies with less", ylim=(0, 1.02))
     axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.15), ncols=2, frameon=False)
     axes.grid(alpha=0.3)
 
@@ -118,13 +129,14 @@ def _use_log_axis(axes: Axes, ratio: float) -> None:
     axes.xaxis.set_minor_formatter(NullFormatter())
 
 
-def best_bodies_figure(bodies: Sequence[tuple[Body, str]]) -> Figure:
+def best_bodies_figure(result: Result) -> Figure:
     """The best bodies side by side, best first, each with its title."""
-    figure = new_figure(4.8 * len(bodies), 5.0)
-    for axes, (body, title) in zip(
-        np.atleast_1d(figure.subplots(1, len(bodies))), bodies, strict=True
-    ):
+    figure = new_figure(4.8 * len(result.bodies), 5.0)
+    panels = figure.subplots(1, len(result.bodies), squeeze=False)[0]
+    for axes, xml, index in zip(panels, result.bodies, result.ranking, strict=False):
+        body, _ = from_mjcf(xml)
         draw_body(axes, body)
+        title = result.title(int(index))
         axes.set_title(f"{title}\n{body.n_nodes} nodes, {body.n_springs} springs")
     return figure
 
@@ -134,86 +146,3 @@ def _colours(count: int) -> list[Any]:
         return list(GROUP_COLOURS[:count])
 
     return list(mpl.colormaps["viridis"](np.linspace(0.0, 0.9, count)))
-
-
-def pruning_figure(
-    counts: Sequence[int],
-    errors: Mapping[str, Array],
-    full_errors: Array,
-    threshold: float,
-    *,
-    body: Body,
-    sensed: npt.NDArray[np.int64],
-) -> Figure:
-    """Closed-loop error against the number of sensed springs; the first body and its sensors.
-
-    Args:
-        counts: (K,) numbers of springs.
-        errors: (bodies, K) orbit errors by method.
-        full_errors: (bodies,) with all springs.
-        threshold: of a success.
-        body: drawn, with the springs `sensed` in black.
-    """
-    figure = new_figure(11.5, 4.6)
-    left, right = figure.subplots(1, 2, width_ratios=[1.35, 1.0])
-    top = 3.0  # everything worse, blow-ups too, is drawn here
-    for (method, table), colour in zip(errors.items(), GROUP_COLOURS, strict=False):
-        low, middle, high = np.quantile(np.minimum(table, top), (0.25, 0.5, 0.75), axis=0)
-        left.loglog(
-            counts, middle, "o-", ms=3.5, lw=1.3, color=colour, label=_ORDERS.get(method, method)
-        )
-        if len(table) > 1:
-            left.fill_between(counts, low, high, color=colour, alpha=0.15, lw=0)
-    left.axhline(np.median(full_errors), color="0.4", ls=":", lw=1.3, label="all springs")
-    left.axhline(
-        threshold, color=TARGET_COLOUR, ls="--", lw=1, label=f"success below {threshold:g}"
-    )
-    ticks = [n for n in (2, 3, 5, 10, 20, 30, 60, 100, 200) if min(counts) <= n <= max(counts)]
-    left.set_xticks(ticks, [str(n) for n in ticks])
-    left.minorticks_off()
-    several = len(full_errors) > 1
-    name = (
-        f"orbit error (median of {len(full_errors)} bodies, quartiles)"
-        if several
-        else "orbit error"
-    )
-    left.set(xlabel="springs sensed", ylabel=name)
-    left.grid(alpha=0.3)
-    left.legend(frameon=False)
-    draw_body(right, body)
-    lines = body.positions[body.springs[sensed]]
-    right.add_collection(LineCollection(list(lines), colors="black", linewidths=2.2, zorder=1))
-    right.set_title(f"{len(lines)} of {body.n_springs} springs (black) suffice")
-    return figure
-
-
-def guided_figure(
-    objectives: Sequence[float],
-    judged: Mapping[str, Array],
-    threshold: float,
-    *,
-    names: tuple[str, str],
-    maximise: tuple[bool, bool] = (False, False),
-) -> Figure:
-    """The objective of every setting tried and the best so far; scores on other bodies.
-
-    Args:
-        objectives: in the order of the trials.
-        judged: scores (bodies,) by label.
-        threshold: of a success.
-        names, maximise: of the objective, and of the score.
-    """
-    figure = new_figure(11.0, 4.0)
-    left, right = figure.subplots(1, 2)
-    values = np.array(objectives)
-    number = np.arange(1, len(values) + 1)
-    so_far = (np.maximum if maximise[0] else np.minimum).accumulate(values)
-    left.plot(number, values, ".", color="0.5", label="a setting")
-    left.step(number, so_far, where="post", color="black", lw=1.4, label="best so far")
-    count_in_whole_numbers(left)
-    left.set(xlabel="settings tried", ylabel=f"objective ({names[0]})")
-    left.grid(alpha=0.3)
-    left.legend(frameon=False)
-    draw_scores(right, judged, threshold, name=names[1], maximise=maximise[1])
-    right.set_title("on bodies that the search has not seen")
-    return figure

@@ -96,6 +96,13 @@ class Result:
             "confirmed_score": confirmed.get(index),
         }
 
+    def title(self, index: int) -> str:
+        """What a trial is called in figures and tables."""
+        row = self.describe(index)
+        score = row["score"] if row["confirmed_score"] is None else row["confirmed_score"]
+        where = setting_label(self.settings[index // self.config.seeds])
+        return f"seed {row['seed']}: {short(score)}" + (f" ({where})" if where else "")
+
     @property
     def metrics(self) -> dict[str, object]:
         """As written to metrics.json."""
@@ -123,6 +130,16 @@ class Result:
     def _succeed(self, scores: Array) -> np.ndarray:
         target = self.config.target
         return scores > target.threshold if target.maximise else scores < target.threshold
+
+
+def setting_label(setting: dict[str, object]) -> str:
+    """A setting in a few words."""
+    return ", ".join(f"{path.rpartition('.')[2]} {short(value)}" for path, value in setting.items())
+
+
+def short(value: object) -> str:
+    """Three digits."""
+    return f"{value:.3g}" if isinstance(value, float) else str(value)
 
 
 def ranking_of(score: Score, scores: Array, confirmations: Sequence[Confirmation]) -> np.ndarray:

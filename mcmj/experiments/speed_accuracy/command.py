@@ -4,12 +4,11 @@ import csv
 import io
 from pathlib import Path
 
-from matplotlib.figure import Figure
 from rich.console import Console
 from rich.table import Table
 
 from mcmj.experiments.base import Experiment
-from mcmj.experiments.speed_accuracy.figure import work_precision_figure
+from mcmj.experiments.speed_accuracy.figure import figures
 from mcmj.experiments.speed_accuracy.run import BASE, Config, Result, run
 from mcmj.utils import files
 from mcmj.utils.progress import progress_bar
@@ -18,11 +17,6 @@ from mcmj.utils.progress import progress_bar
 def write(result: Result, folder: Path) -> None:
     """All cells as a table."""
     files.write_text(folder / "speed_accuracy.csv", as_csv(result))
-
-
-def figures(result: Result) -> dict[str, Figure]:
-    """Work against precision."""
-    return {"speed_accuracy": work_precision_figure(result.cells, result.orders)}
 
 
 def as_csv(result: Result) -> str:

@@ -1,12 +1,12 @@
-"""The work-precision diagram. Takes results, never simulates."""
+"""The work-precision diagram: error over cost."""
 
 from collections.abc import Mapping
-from typing import Protocol
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from mcmj.core.integrators import INTEGRATORS
+from mcmj.experiments.speed_accuracy.run import Cell, Result
 from mcmj.pictures.plotting import INTEGRATOR_MARKS, new_figure
 from mcmj.utils.colours import GREY, INTEGRATOR_COLOURS, Colour
 
@@ -23,38 +23,25 @@ for _name, _mark in INTEGRATOR_MARKS.items():
 COLUMNS = 4
 
 
-class Point(Protocol):
-    """One method at one step."""
-
-    @property
-    def error(self) -> float:
-        """Relative position error."""
-
-    @property
-    def cost_ratio(self) -> float:
-        """Cost over that of Euler at 1 ms."""
+def figures(result: Result) -> dict[str, Figure]:
+    """By file name."""
+    return {"speed_accuracy": work_precision_figure(result)}
 
 
-def work_precision_figure(
-    cells: Mapping[str, Mapping[str, Mapping[float, Point]]], orders: Mapping[str, object]
-) -> Figure:
-    """Error over cost, a panel a body, a curve a method, a point a step.
-
-    Args:
-        cells: [body][method][step_ms] with error and cost_ratio.
-        orders: observed order by method (objects with `slope`), or None.
-    """
+def work_precision_figure(result: Result) -> Figure:
+    """Error over cost, a panel a body, a curve a method, a point a step."""
+    cells = result.cells
     rows = -(-(len(cells) + 1) // COLUMNS)
     figure = new_figure(4.0 * COLUMNS, 3.9 * rows)
     grid = figure.subplots(rows, COLUMNS, squeeze=False).ravel()
     for axes, (body, methods) in zip(grid, cells.items(), strict=False):
         _draw_body(axes, body, methods)
     handles, labels = [], []
-    for method in next(iter(cells.values())):
+    for method in result.config.methods:
         colour, style = _style(method)
         (line,) = grid[-1].plot([], [], style, color=colour, ms=4)
-        order = orders.get(method)
-        slope = f"  (order {order.slope:.1f})" if order is not None else ""  # type: ignore[attr-defined]
+        order = result.orders[method]
+        slope = f"  (order {order.slope:.1f})" if order is not None else ""
         handles.append(line)
         labels.append(method.replace("_", " ", 1) + slope)
     for axes in grid[len(cells) :]:
@@ -63,7 +50,7 @@ def work_precision_figure(
     return figure
 
 
-def _draw_body(axes: Axes, body: str, methods: Mapping[str, Mapping[float, Point]]) -> None:
+def _draw_body(axes: Axes, body: str, methods: Mapping[str, Mapping[float, Cell]]) -> None:
     for method, steps in methods.items():
         colour, style = _style(method)
         good = [(cell.cost_ratio, cell.error) for cell in steps.values() if cell.error < 1.0]

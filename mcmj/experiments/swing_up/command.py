@@ -2,12 +2,11 @@
 
 from pathlib import Path
 
-from matplotlib.figure import Figure
 from rich.console import Console
 from rich.table import Table
 
 from mcmj.experiments.base import Experiment
-from mcmj.experiments.perturb.figure import swing_up_figure
+from mcmj.experiments.swing_up.figure import figures
 from mcmj.experiments.swing_up.run import Config, Result, run, total_steps
 from mcmj.utils import files
 from mcmj.utils.progress import progress_bar
@@ -18,15 +17,6 @@ def write(result: Result, folder: Path) -> None:
     config, seed = result.config, result.config.of_seed(0).noise_seed
     arrays = {f"{name}/outputs": task.outputs for name, task in result.bodies[0].items()}
     files.write_arrays(folder / "trajectory.npz", arrays, config, seed)
-
-
-def figures(result: Result) -> dict[str, Figure]:
-    """Fig. 7 of the first body."""
-    runs = {
-        name: (t.target, result.config.timestep, t.outputs, t.orbit_error, t.swing_up_time)
-        for name, t in result.bodies[0].items()
-    }
-    return {"swing_up": swing_up_figure(runs)}
 
 
 def show(result: Result, console: Console) -> None:

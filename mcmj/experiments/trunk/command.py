@@ -3,13 +3,12 @@
 from pathlib import Path
 from typing import Any
 
-from matplotlib.figure import Figure
 from rich.console import Console
 from rich.table import Table
 
 from mcmj.experiments.base import Experiment
 from mcmj.experiments.trunk.config import Config, total_seconds
-from mcmj.experiments.trunk.figure import trunk_figure
+from mcmj.experiments.trunk.figure import figures
 from mcmj.experiments.trunk.run import Result, run
 from mcmj.robots.trunk_walker import TIMESTEP
 from mcmj.utils import files
@@ -26,18 +25,6 @@ def write(result: Result, folder: Path) -> None:
         if gait.learned is not None
     }
     files.write_arrays(folder / "readouts.npz", arrays, result.config, result.config.seed)
-
-
-def figures(result: Result) -> dict[str, Figure]:
-    """The trunk, and how it walks."""
-    walks = {
-        name: (gait.target, gait.walk)
-        for name, gait in result.gaits.items()
-        if gait.walk is not None
-    }
-    if not walks:
-        return {}
-    return {"trunk": trunk_figure(next(iter(result.gaits.values())).trunk, walks)}
 
 
 def film(result: Result, out: Path) -> None:

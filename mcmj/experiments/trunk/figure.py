@@ -1,12 +1,11 @@
-"""Figure of a walking trunk: the robot, its muscles' commands, its feet on the ground."""
-
-from collections.abc import Mapping
+"""A walking trunk: the robot, its muscles' commands, its feet on the ground."""
 
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 
-from mcmj.experiments.walk.figure import draw_stance
+from mcmj.experiments.trunk.run import Result
+from mcmj.pictures.footfalls import draw_stance
 from mcmj.pictures.plotting import OUTPUT_STYLES, TARGET_STYLE, best_phase, new_figure
 from mcmj.robots.trunk import Trunk
 from mcmj.robots.walk_metrics import Walk
@@ -17,12 +16,20 @@ from mcmj.utils.colours import MUSCLE_COLOUR
 PERIODS = 3.0  # of each gait that are shown
 
 
-def trunk_figure(trunk: Trunk, walks: Mapping[str, tuple[Target, Walk]]) -> Figure:
-    """The robot as drawn; below, gait by gait, commands of a fore leg on their target, and feet.
+def figures(result: Result) -> dict[str, Figure]:
+    """By file name; none if no gait was learned."""
+    learned = any(gait.walk is not None for gait in result.gaits.values())
+    return {"trunk": trunk_figure(result)} if learned else {}
 
-    Args:
-        walks: by gait, the muscles' target and a walk.
-    """
+
+def trunk_figure(result: Result) -> Figure:
+    """The robot as drawn; below, gait by gait, commands of a fore leg on their target, and feet."""
+    trunk = next(iter(result.gaits.values())).trunk
+    walks = {
+        name: (gait.target, gait.walk)
+        for name, gait in result.gaits.items()
+        if gait.walk is not None
+    }
     figure = new_figure(3.1 * max(2, len(walks)), 7.4)
     grid = figure.add_gridspec(3, len(walks), height_ratios=(1.5, 1.2, 0.8))
     robot = figure.add_subplot(grid[0, :])

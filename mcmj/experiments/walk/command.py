@@ -3,39 +3,15 @@
 from pathlib import Path
 from typing import Any
 
-from matplotlib.figure import Figure
 from rich.console import Console
 from rich.table import Table
 
 from mcmj.experiments.base import Experiment
 from mcmj.experiments.walk.config import Config, total_steps
-from mcmj.experiments.walk.figure import footfalls, phase_responses, pushes, stride_periods
+from mcmj.experiments.walk.figure import figures
 from mcmj.experiments.walk.run import Result, run, tour
 from mcmj.utils import files
 from mcmj.utils.progress import progress_bar
-
-SHOWN = 4.0  # seconds of footfalls in the figure
-
-
-def figures(result: Result) -> dict[str, Figure]:
-    """Footfalls, and what the parts of the config ask for."""
-    found = {}
-    table: Any = files.plain(result.metrics)
-    if result.walks:
-        titles = {
-            name: f"{name}: {table[name]['stride_period_s']:.2f} s, "
-            + (f"{table[name]['speed_m_s']:.2f} m/s" if table[name]["speed_m_s"] else "falls")
-            for name in result.walks
-        }
-        found["footfalls"] = footfalls(result.walks, titles, shown=SHOWN)
-    if "push" in table:
-        counts = {name: table["push"][name]["survived"] for name in result.config.gaits}
-        found["pushes"] = pushes(counts, result.config.seeds)
-    if "adapt" in table:
-        found["adapt"] = stride_periods(table["adapt"])
-    if "recover" in table:
-        found["recover"] = phase_responses(table["recover"], result.config.nudge)
-    return found
 
 
 def film(result: Result, out: Path) -> None:

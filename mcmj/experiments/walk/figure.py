@@ -1,4 +1,4 @@
-"""Figures of walks: footfalls, pushes survived, and how the rhythm answers the ground."""
+"""Walks: footfalls, pushes survived, and how the rhythm answers the ground."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -7,14 +7,17 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from mcmj.experiments.walk.config import Config
+from mcmj.experiments.walk.run import Result
+from mcmj.pictures.footfalls import draw_stance
 from mcmj.pictures.plotting import new_figure
 from mcmj.robots.walk_metrics import Walk
-from mcmj.targets.gaits import LEGS
+from mcmj.utils import files
 from mcmj.utils.colours import BLUE, GREEN, ORANGE, RED
 from mcmj.utils.validation import Array
 
 COLOURS = (BLUE, GREEN, RED, ORANGE)
-BAR = 0.7
+SHOWN = 4.0  # seconds of each walk in the figure of footfalls
 STYLES: dict[str, dict[str, Any]] = {  # of stages without and with the ground in the body
     "uncoupled": {"color": "0.55", "marker": "s", "ms": 4, "ls": "--"},
     "coupled": {"color": COLOURS[0], "marker": "o", "ms": 4},
@@ -22,11 +25,26 @@ STYLES: dict[str, dict[str, Any]] = {  # of stages without and with the ground i
 CAUSES = {"slope": "slope [degrees]", "load": "load [kg]"}
 
 
-def footfalls(walks: Mapping[str, Walk], titles: Mapping[str, str], *, shown: float) -> Figure:
+def figures(result: Result) -> dict[str, Figure]:
+    """By file name: what the parts of the config ask for."""
+    found = {}
+    table: Any = files.plain(result.metrics)
+    if result.walks:
+        found["footfalls"] = footfalls(result.walks, table)
+    if "push" in table:
+        found["pushes"] = pushes(result.config, table["push"])
+    if "adapt" in table:
+        found["adapt"] = stride_periods(table["adapt"])
+    if "recover" in table:
+        found["recover"] = phase_responses(table["recover"], result.config.nudge)
+    return found
+
+
+def footfalls(walks: Mapping[str, Walk], table: Mapping[str, Any]) -> Figure:
     """When each foot bears load, over the last seconds of each walk.
 
     Args:
-        shown: time of each walk [s].
+        table: of the part walk, by gait.
     """
     rows = -(-len(walks) // 2)
     figure = new_figure(11.0, 1.9 * rows + 0.3)
@@ -34,33 +52,27 @@ def footfalls(walks: Mapping[str, Walk], titles: Mapping[str, str], *, shown: fl
     for axes in grid[len(walks) :]:
         axes.set_axis_off()
     for (name, walk), axes in zip(walks.items(), grid, strict=False):
-        draw_stance(axes, walk.after(walk.times[-1] - shown))
-        axes.set(xlim=(0, shown), title=titles[name], xlabel="time [s]")
+        draw_stance(axes, walk.after(walk.times[-1] - SHOWN))
+        period, speed = table[name]["stride_period_s"], table[name]["speed_m_s"]
+        title = f"{name}: {period:.2f} s, " + (f"{speed:.2f} m/s" if speed else "falls")
+        axes.set(xlim=(0, SHOWN), title=title, xlabel="time [s]")
     return figure
 
 
-def draw_stance(axes: Axes, walk: Walk) -> None:
-    """A bar for each foot while it bears load, over the time since the walk's first sample [s]."""
-    times = walk.times - walk.times[0]
-    for leg in range(len(LEGS)):
-        down = np.r_[False, walk.contact[0, :, leg] > 0, False].astype(int)
-        edges = np.flatnonzero(np.diff(down)).reshape(-1, 2)
-        spans = [(times[a], times[b - 1] - times[a]) for a, b in edges]
-        axes.broken_barh(spans, (len(LEGS) - 1 - leg - BAR / 2, BAR), facecolors="black", lw=0)
-    axes.set_yticks(np.arange(len(LEGS))[::-1], LEGS)
-    axes.spines[["left", "right", "top"]].set_visible(False)
-    axes.tick_params(axis="y", length=0)
+def pushes(config: Config, table: Mapping[str, Any]) -> Figure:
+    """Share of pushes survived by impulse: a bar for each gait.
 
-
-def pushes(survived: Mapping[str, Mapping[str, int]], total: int) -> Figure:
-    """Share of pushes survived by impulse: a bar for each gait."""
+    Args:
+        table: of the part push.
+    """
+    survived = {name: table[name]["survived"] for name in config.gaits}
     figure = new_figure(5.6, 3.8)
     axes = figure.subplots()
     impulses = list(next(iter(survived.values())))
     width = 0.8 / len(survived)
     for index, (name, counts) in enumerate(survived.items()):
         places = np.arange(len(impulses)) - 0.4 + (index + 0.5) * width
-        share = [100 * count / total for count in counts.values()]
+        share = [100 * count / config.seeds for count in counts.values()]
         bars = axes.bar(places, share, 0.9 * width, color=COLOURS[index], label=name)
         axes.bar_label(bars, [str(count) for count in counts.values()], fontsize=8)
     axes.set_xticks(np.arange(len(impulses)), impulses)
