@@ -5,7 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mcmj.experiments.filters.run import Config, filtering_body, run
+from mcmj.experiments.filters.config import Config, filtering_body
+from mcmj.experiments.filters.run import run
 from mcmj.experiments.filters.switching import SwitchConfig, pauses_held, run_switch
 from mcmj.experiments.linearise.run import Config as LineariseConfig
 from mcmj.experiments.linearise.run import run as linearise

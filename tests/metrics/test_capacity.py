@@ -6,7 +6,8 @@ import pytest
 import mcmj
 from mcmj.core.random_body import draw_body
 from mcmj.experiments.capacity import run as experiment
-from mcmj.experiments.capacity.run import Config, measure, probed_body
+from mcmj.experiments.capacity.config import Config, probed_body
+from mcmj.experiments.capacity.run import measure
 from mcmj.metrics.capacity import (
     generalisation_rank,
     kernel_rank,

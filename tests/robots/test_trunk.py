@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from mcmj.core.callbacks import install
-from mcmj.experiments.trunk.run import forward_speed
+from mcmj.experiments.trunk.result import forward_speed
 from mcmj.metrics.orbits import orbit_error
 from mcmj.robots.force_learning import ForceLearning, force_learn
 from mcmj.robots.quadruped import GRAVITY

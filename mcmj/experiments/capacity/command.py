@@ -4,8 +4,10 @@ from rich.console import Console
 from rich.table import Table
 
 from mcmj.experiments.base import Experiment
+from mcmj.experiments.capacity.config import Config, total_bodies
 from mcmj.experiments.capacity.figure import figures
-from mcmj.experiments.capacity.run import Config, Result, run, total_bodies
+from mcmj.experiments.capacity.result import Result
+from mcmj.experiments.capacity.run import run
 from mcmj.utils.progress import progress_bar
 
 

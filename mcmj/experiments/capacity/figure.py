@@ -7,7 +7,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from mcmj.experiments.capacity.run import Result
+from mcmj.experiments.capacity.result import Result
 from mcmj.pictures.plotting import new_figure
 from mcmj.utils.colours import GROUP_COLOURS
 from mcmj.utils.validation import Array

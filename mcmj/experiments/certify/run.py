@@ -6,14 +6,7 @@ from typing import NamedTuple
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from mcmj.analysis.stability.basin import (
-    Survey,
-    kicked,
-    on_cycle,
-    pushed,
-    scaled_starts,
-    survey,
-)
+from mcmj.analysis.stability.basin import Survey, kicked, on_cycle, pushed, scaled_starts, survey
 from mcmj.analysis.stability.confirm import monodromy_error, verdicts
 from mcmj.analysis.stability.cycle import Cycle, find_cycle
 from mcmj.analysis.stability.floquet import floquet, target_multipliers

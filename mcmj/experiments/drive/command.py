@@ -5,8 +5,10 @@ from pathlib import Path
 from rich.console import Console
 
 from mcmj.experiments.base import Experiment
+from mcmj.experiments.drive.config import Config, total_episodes
 from mcmj.experiments.drive.figure import figures
-from mcmj.experiments.drive.run import Config, Episode, Result, run, total_episodes
+from mcmj.experiments.drive.result import Episode, Result
+from mcmj.experiments.drive.run import run
 from mcmj.utils import files
 from mcmj.utils.progress import progress_bar
 

@@ -4,7 +4,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from mcmj.experiments.drive.run import Episode, Result
+from mcmj.experiments.drive.result import Episode, Result
 from mcmj.pictures.plotting import (
     OUTPUT_STYLES,
     TITLES,

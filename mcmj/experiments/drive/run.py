@@ -6,129 +6,25 @@ the first seconds that brings the body onto the orbit; it sees only the episodes
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mcmj.core.body import Body
-from mcmj.core.random_body import MOST_NODES, random_body
+from mcmj.core.random_body import random_body
+from mcmj.experiments.drive.config import Config
+from mcmj.experiments.drive.result import Episode, Result
 from mcmj.learning.environments.setting import Setting
 from mcmj.learning.lessons import Teaching
 from mcmj.learning.teaching import teach
 from mcmj.metrics import orbits
 from mcmj.simulation.simulation import Simulation
-from mcmj.targets.limit_cycles import Target
 from mcmj.targets.named import named_target
 from mcmj.utils.progress import OnSteps
 from mcmj.utils.seeds import stream
-from mcmj.utils.validation import (
-    Array,
-    require_count,
-    require_duration,
-    require_number,
-    require_seed,
-)
+from mcmj.utils.validation import Array
 
 if TYPE_CHECKING:
     from mcmj.learning.environments.environment import Environment
-
-
-@dataclass(frozen=True)
-class Config:
-    """What to learn.
-
-    Attributes:
-        task: van_der_pol, .., a .csv file or package.module:function: taught to the body, then
-            to be reached.
-        seed: of the random body, its teaching and the search.
-        nodes: of the body.
-        knots: of the input signal, one number each, linear in between and 0 after the last.
-        drive: the signal ends after this time [s].
-        input_limit: largest input [units of the channel].
-        population, elites, rounds: of the cross-entropy method.
-        spread: first standard deviation, as a share of the limit.
-        least_spread: is added to the elites' in every round, as a share of the limit.
-        control_timestep: between actions [s].
-        time_limit: of an episode, from total rest [s].
-    """
-
-    task: str = "van_der_pol"
-    seed: int = 2
-    nodes: int = 25
-    knots: int = 10
-    drive: float = 8.0
-    input_limit: float = 10.0
-    population: int = 24
-    elites: int = 6
-    rounds: int = 8
-    spread: float = 0.5
-    least_spread: float = 0.05
-    control_timestep: float = 0.05
-    time_limit: float = 25.0
-
-    def __post_init__(self) -> None:
-        named_target(self.task)
-        require_count("knots", self.knots, 1)
-        require_count("nodes", self.nodes, 3, MOST_NODES)
-        require_seed("seed", self.seed)
-        require_duration("time_limit", self.time_limit)
-        require_count("rounds", self.rounds, 1)
-        require_count("elites", self.elites, 2)
-        require_count("population", self.population, self.elites)
-        require_number("drive", self.drive, 0.0, self.time_limit, open_low=True)
-        require_number("control_timestep", self.control_timestep, 1e-3)
-        for name in ("input_limit", "spread"):
-            require_number(name, getattr(self, name), 0.0, open_low=True)
-        require_number("least_spread", self.least_spread, 0.0)
-
-
-@dataclass(frozen=True)
-class Episode:
-    """From total rest: times (K,) [s], inputs (K,), outputs (K, n_outputs), rewards (K,)."""
-
-    times: Array
-    inputs: Array
-    outputs: Array
-    rewards: Array
-
-    @property
-    def mean_reward(self) -> float:
-        """What is searched for."""
-        return float(self.rewards.mean())
-
-
-@dataclass(frozen=True)
-class Result:
-    """The search.
-
-    Attributes:
-        rewards: (rounds, population) mean rewards of all episodes.
-        before, after: without input, and with the best one found.
-        errors: orbit errors of the last period of the two.
-    """
-
-    config: Config
-    body: Body
-    target: Target
-    rewards: Array
-    before: Episode
-    after: Episode
-    errors: tuple[float, float]
-
-    @property
-    def metrics(self) -> dict[str, object]:
-        """As written to metrics.json."""
-        before, after = self.errors
-        return {
-            "mean_reward_without_input": self.before.mean_reward,
-            "mean_reward_learned": self.after.mean_reward,
-            "orbit_error_without_input": before,
-            "orbit_error_learned": after,
-            "episodes": self.rewards.size + 1,
-            "best_by_round": self.rewards.max(axis=1),
-            "median_by_round": np.median(self.rewards, axis=1),
-        }
 
 
 def run(config: Config, *, on_steps: OnSteps = lambda steps: None) -> Result:
@@ -162,11 +58,6 @@ def run(config: Config, *, on_steps: OnSteps = lambda steps: None) -> Result:
     period = round(wanted.period / config.control_timestep)
     errors = [orbits.orbit_error(episode.outputs[-period:], wanted) for episode in (before, after)]
     return Result(config, body, wanted, rewards, before, after, (errors[0], errors[1]))
-
-
-def total_episodes(config: Config) -> int:
-    """For a progress bar."""
-    return config.population * config.rounds + 2
 
 
 def _cross_entropy(config: Config, score: Callable[[Array], float]) -> tuple[Array, Array]:

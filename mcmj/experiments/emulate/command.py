@@ -4,8 +4,10 @@ from rich.console import Console
 from rich.table import Table
 
 from mcmj.experiments.base import Experiment
+from mcmj.experiments.emulate.config import REPORTED, Config
 from mcmj.experiments.emulate.figure import figures
-from mcmj.experiments.emulate.run import REPORTED, Config, Result, run
+from mcmj.experiments.emulate.result import Result
+from mcmj.experiments.emulate.run import run
 from mcmj.utils.progress import progress_bar
 
 

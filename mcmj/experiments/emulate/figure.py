@@ -7,7 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from mcmj.core.integrators import INTEGRATORS
-from mcmj.experiments.emulate.run import Cell, Result
+from mcmj.experiments.emulate.result import Cell, Result
 from mcmj.pictures.plotting import INTEGRATOR_MARKS, OUTPUT_STYLES, TARGET_STYLE, new_figure
 from mcmj.utils.colours import INTEGRATOR_COLOURS
 from mcmj.utils.validation import Array

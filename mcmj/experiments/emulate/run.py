@@ -10,139 +10,21 @@ and, above all, how well K knows p and q.
 """
 
 import warnings
-from dataclasses import dataclass
 
 import numpy as np
 from scipy.integrate import solve_ivp
 
 from mcmj.analysis.emulation import emulation_body
-from mcmj.core.integrators import INTEGRATORS
-from mcmj.experiments.emulate.systems import SYSTEMS, System, mismatched, system, user_system
-from mcmj.metrics.convergence import Order, observed_order
+from mcmj.experiments.emulate.config import REPORTED, Config
+from mcmj.experiments.emulate.result import Cell, Result
+from mcmj.experiments.emulate.systems import System, mismatched, system, user_system
+from mcmj.metrics.convergence import observed_order
 from mcmj.simulation.simulation import Simulation
-from mcmj.utils.errors import (
-    DivergenceError,
-    InvalidArgumentError,
-    McmjError,
-    StabilityWarning,
-    UnknownNameError,
-)
+from mcmj.utils.errors import DivergenceError, McmjError, StabilityWarning
 from mcmj.utils.progress import OnSteps
-from mcmj.utils.validation import (
-    SHORTEST_STEP,
-    Array,
-    require_duration,
-    require_number,
-    require_seed,
-)
+from mcmj.utils.validation import Array
 
-REPORTED = 1.0  # ms: the step of the errors in metrics.json
 RTOL = 1e-13
-
-
-@dataclass(frozen=True)
-class Config:
-    """What to emulate.
-
-    Attributes:
-        targets: names of emulated_systems.SYSTEMS.
-        g: a G(x1, x2) of your own as text, as in --g="-x1 + (1 - x1**2) * x2"; target "user".
-        integrators: mcmj's names.
-        steps_ms: integration steps [ms], divisors of the horizon, 1 among them.
-        horizon: length of the runs [s].
-        mismatches: shares of p and q that K does not know, for the Van der Pol target under RK4.
-        seed: for the record; nothing is random here.
-    """
-
-    targets: tuple[str, ...] = tuple(SYSTEMS)
-    g: str | None = None
-    integrators: tuple[str, ...] = tuple(INTEGRATORS)
-    steps_ms: tuple[float, ...] = (0.5, 1.0, 2.0, 4.0, 8.0, 16.0)
-    horizon: float = 8.0
-    mismatches: tuple[float, ...] = (1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1)
-    seed: int = 0
-
-    def __post_init__(self) -> None:
-        for kind, names, valid in (
-            ("target", self.targets, tuple(SYSTEMS)),
-            ("integrator", self.integrators, INTEGRATORS),
-        ):
-            for name in names:
-                if name not in valid:
-                    raise UnknownNameError(kind, name, valid)
-        require_seed("seed", self.seed)
-        for step in self.steps_ms:
-            require_number("steps_ms", step, 1e3 * SHORTEST_STEP)
-            require_duration("horizon", self.horizon, 1e-3 * step)
-            count = 1e3 * self.horizon / step
-            if abs(count - round(count)) > 1e-9:
-                raise InvalidArgumentError(
-                    "steps_ms", f"divisors of the horizon {self.horizon:g} s", f"{step:g} ms"
-                )
-        if REPORTED not in self.steps_ms:
-            raise InvalidArgumentError("steps_ms", "1 ms among them", self.steps_ms)
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """All targets, the user's too."""
-        return self.targets if self.g is None else (*self.targets, "user")
-
-
-@dataclass(frozen=True)
-class Cell:
-    """One target, integrator and step: the error, infinite where it blew up."""
-
-    error: float
-
-
-@dataclass(frozen=True)
-class Result:
-    """What was measured.
-
-    Attributes:
-        cells: [target][integrator][step_ms].
-        orders: [target][integrator], None where too few steps were usable.
-        orbits: [target] states (T, n) of the body at 1 ms under the last integrator, and those
-            of the target.
-        held_at_start: the driven target's errors [integrator][step_ms] with inputs sampled at
-            the start of each step instead of its middle.
-        mismatch_errors: Van der Pol's, by the share of p and q that K does not know.
-    """
-
-    config: Config
-    cells: dict[str, dict[str, dict[float, Cell]]]
-    orders: dict[str, dict[str, Order | None]]
-    orbits: dict[str, tuple[Array, Array]]
-    held_at_start: dict[str, dict[float, Cell]]
-    mismatch_errors: dict[float, float]
-
-    @property
-    def slopes(self) -> dict[str, dict[str, float | None]]:
-        """Observed order by target and integrator."""
-        return {t: {m: _slope(order) for m, order in o.items()} for t, o in self.orders.items()}
-
-    @property
-    def metrics(self) -> dict[str, object]:
-        """As written to metrics.json."""
-        table: dict[str, object] = {}
-        for target, methods in self.cells.items():
-            table[target] = {
-                name: {
-                    "error": steps[REPORTED].error,
-                    "order": self.slopes[target][name],
-                    "errors": {f"{step:g}": cell.error for step, cell in steps.items()},
-                }
-                for name, steps in methods.items()
-            }
-        table["input_held_from_start"] = {
-            name: {
-                "error": steps[REPORTED].error,
-                "order": _slope(observed_order({"driven": {name: steps}}, name)),
-            }
-            for name, steps in self.held_at_start.items()
-        }
-        table["mismatch"] = {f"{size:g}": error for size, error in self.mismatch_errors.items()}
-        return table
 
 
 def run(config: Config, *, on_steps: OnSteps = lambda steps: None) -> Result:
@@ -236,7 +118,3 @@ def _mismatch_error(config: Config, size: float) -> float:
     one = mismatched(size)
     wanted = reference(one, REPORTED, config.horizon)
     return emulation_error(emulate(one, "RK4", REPORTED, config.horizon), wanted)
-
-
-def _slope(order: Order | None) -> float | None:
-    return order.slope if order else None

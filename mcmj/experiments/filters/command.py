@@ -4,8 +4,10 @@ from rich.console import Console
 from rich.table import Table
 
 from mcmj.experiments.base import Experiment
+from mcmj.experiments.filters.config import Config
 from mcmj.experiments.filters.figure import figures
-from mcmj.experiments.filters.run import Config, Result, run
+from mcmj.experiments.filters.result import Result
+from mcmj.experiments.filters.run import run
 from mcmj.utils.progress import progress_bar
 
 

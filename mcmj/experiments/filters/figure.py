@@ -5,7 +5,8 @@ from collections.abc import Mapping
 import numpy as np
 from matplotlib.figure import Figure
 
-from mcmj.experiments.filters.run import IN_SYMBOLS, TIMESTEP, FilterResult, Result
+from mcmj.experiments.filters.config import IN_SYMBOLS, TIMESTEP
+from mcmj.experiments.filters.result import FilterResult, Result
 from mcmj.experiments.filters.switching import SwitchResult
 from mcmj.pictures.plotting import OUTPUT_STYLES, TARGET_STYLE, new_figure
 

@@ -6,11 +6,10 @@ moment, and with delays. What the body does better than the second is nonlinear;
 better than the first is that, or memory (a plain delay is no feat beside the second).
 """
 
-from dataclasses import dataclass, field
-
-from mcmj.core.integrators import DEFAULT_INTEGRATOR
-from mcmj.core.random_body import BodySettings, draw_body
-from mcmj.experiments.filters.switching import SwitchConfig, SwitchResult, run_switch
+from mcmj.core.random_body import draw_body
+from mcmj.experiments.filters.config import IN_SYMBOLS, SAMPLED, TIMESTEP, Config
+from mcmj.experiments.filters.result import FilterResult, Result
+from mcmj.experiments.filters.switching import run_switch
 from mcmj.learning.regression import fit_readout
 from mcmj.metrics import orbits
 from mcmj.simulation.held_symbols import held_states
@@ -23,126 +22,11 @@ from mcmj.targets.filter_tasks import (
     toolbox_narma,
     volterra,
 )
-from mcmj.utils.errors import InvalidArgumentError, UnknownNameError
 from mcmj.utils.progress import OnSteps
 from mcmj.utils.seeds import stream
-from mcmj.utils.validation import (
-    Array,
-    require_count,
-    require_duration,
-    require_number,
-    require_seed,
-)
+from mcmj.utils.validation import Array
 
-SAMPLED = ("volterra", "toolbox_narma")  # one input a millisecond
-IN_SYMBOLS = ("narma10", "delayed_recall")  # which share their input, and so one run
-TASKS = (*SAMPLED, *IN_SYMBOLS, "switch")
-TIMESTEP = 1e-3  # s
-REPEAT = 50.0  # s: after which the input of the tasks at 1 ms comes back
 SPARSE = 10  # one in so many samples of a 1 ms task is regressed on: neighbours say the same
-
-
-def filtering_body() -> BodySettings:
-    """Stiffer and smaller than the rhythms' bodies, near the toolbox's two filter scripts."""
-    return BodySettings(
-        nodes=60, width=10.0, height=10.0, k1=(20.0, 400.0), k3=(10.0, 100.0), d1=(1.0, 100.0),
-        d3=(1.0, 100.0), n_inputs=1, n_outputs=0,
-    )  # fmt: skip
-
-
-@dataclass(frozen=True)
-class Config:
-    """What to run.
-
-    Attributes:
-        tasks: any of volterra, toolbox_narma, narma10, delayed_recall, switch.
-        seed: of the body and the inputs.
-        train, washout, test: lengths of the parts of the tasks at 1 ms [s]. Their input is a
-            product of sines that comes back, with its sign changed, after 50 s: train and test
-            must fit into that, or what is tested was taught.
-        symbols, washout_symbols, test_symbols: lengths of the parts of the tasks in symbols.
-        hold: how long a symbol is shown [s]: so long that the body can follow it, so short that
-            it remembers ten of them. Its undamped modes (seed 0) are at 0.2 to 6 Hz.
-        gain: force per unit input, on top of the input weights: large ones use the springs'
-            nonlinearity, small ones their memory.
-        volterra_gain: the same for the Volterra task, whose input is a fifth as large.
-        delay: of delayed_recall [symbols].
-        taps: delays of the input that the baseline has, the present among them.
-        integrator: as for Simulation.
-        engine: mujoco, or twin for quick looks.
-        settings: what the body is drawn from.
-        switch: the task that needs feedback.
-    """
-
-    tasks: tuple[str, ...] = TASKS
-    seed: int = 0
-    train: float = 30.0
-    washout: float = 20.0
-    test: float = 20.0
-    symbols: int = 2000
-    washout_symbols: int = 100
-    test_symbols: int = 500
-    hold: float = 0.2
-    gain: float = 1.0
-    volterra_gain: float = 5.0
-    delay: int = 5
-    taps: int = 30
-    integrator: str = DEFAULT_INTEGRATOR
-    engine: str = "mujoco"
-    settings: BodySettings = field(default_factory=filtering_body)
-    switch: SwitchConfig = field(default_factory=SwitchConfig)
-
-    def __post_init__(self) -> None:
-        for name in self.tasks:
-            if name not in TASKS:
-                raise UnknownNameError("task", name, TASKS)
-        require_seed("seed", self.seed)
-        for name in ("train", "washout", "test", "hold"):
-            require_duration(name, getattr(self, name))
-        for name in ("gain", "volterra_gain"):
-            require_number(name, getattr(self, name), 0.0, open_low=True)
-        for name in ("symbols", "washout_symbols", "test_symbols", "delay", "taps"):
-            require_count(name, getattr(self, name), 1)
-            require_duration(f"{name} x hold", getattr(self, name) * self.hold)
-        if self.train + self.test > REPEAT:
-            raise InvalidArgumentError(
-                "train", f"train + test <= {REPEAT:g} s, after which the input comes back",
-                f"{self.train + self.test:g} s",
-            )  # fmt: skip
-
-
-@dataclass(frozen=True)
-class FilterResult:
-    """One task.
-
-    Attributes:
-        task: what was asked.
-        errors: on held-out data, nrmse_std of the body, baseline_nrmse_std of regression on
-            the input and its delays, input_only_nrmse_std of that on the input alone.
-        outputs, wanted: (M, 1) the body's and the target's held-out values.
-    """
-
-    task: FilterTask
-    errors: dict[str, float]
-    outputs: Array
-    wanted: Array
-
-
-@dataclass(frozen=True)
-class Result:
-    """What was measured."""
-
-    config: Config
-    filters: dict[str, FilterResult]
-    switch: SwitchResult | None
-
-    @property
-    def metrics(self) -> dict[str, object]:
-        """As written to metrics.json."""
-        table: dict[str, object] = {name: r.errors for name, r in self.filters.items()}
-        if self.switch is not None:
-            table["switch"] = self.switch.metrics
-        return table
 
 
 def run(config: Config, *, on_steps: OnSteps = lambda steps: None) -> Result:

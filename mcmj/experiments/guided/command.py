@@ -7,8 +7,10 @@ from rich.console import Console
 from rich.table import Table
 
 from mcmj.experiments.base import Experiment
+from mcmj.experiments.guided.config import Config
 from mcmj.experiments.guided.figure import figures
-from mcmj.experiments.guided.run import Config, OnSetting, Result, run
+from mcmj.experiments.guided.result import Result
+from mcmj.experiments.guided.run import OnSetting, run
 from mcmj.metrics.success_rates import rate_cells
 from mcmj.utils.progress import trial_bar
 

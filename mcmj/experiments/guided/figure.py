@@ -3,7 +3,7 @@
 import numpy as np
 from matplotlib.figure import Figure
 
-from mcmj.experiments.guided.run import Result
+from mcmj.experiments.guided.result import Result
 from mcmj.experiments.search.figure import draw_scores
 from mcmj.pictures.plotting import count_in_whole_numbers, new_figure
 

@@ -8,8 +8,10 @@ from rich.console import Console
 from rich.table import Table
 
 from mcmj.experiments.base import Experiment
+from mcmj.experiments.hard_cases.config import Config
 from mcmj.experiments.hard_cases.figure import figures
-from mcmj.experiments.hard_cases.run import LONGEST, STEPS, Config, Result, Row, run
+from mcmj.experiments.hard_cases.result import STEPS, Result, Row
+from mcmj.experiments.hard_cases.run import LONGEST, run
 from mcmj.utils import files
 from mcmj.utils.progress import progress_bar
 

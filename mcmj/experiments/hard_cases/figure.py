@@ -3,7 +3,7 @@
 import numpy as np
 from matplotlib.figure import Figure
 
-from mcmj.experiments.hard_cases.run import STEPS, Result
+from mcmj.experiments.hard_cases.result import STEPS, Result
 from mcmj.pictures.plotting import new_figure
 from mcmj.utils.colours import BLACK, BLUE, GREEN, TARGET_COLOUR
 

@@ -11,109 +11,25 @@ rate); and blow-up, where the motion itself grows (secants there).
 import math
 import warnings
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 from scipy.integrate import solve_ivp
 
 from mcmj.core.body import spring_lengths
-from mcmj.core.integrators import INTEGRATORS
 from mcmj.core.readout import Readout
 from mcmj.experiments.hard_cases.bodies import CASES, HardCase
+from mcmj.experiments.hard_cases.config import Config
+from mcmj.experiments.hard_cases.result import Result, Row
 from mcmj.reference.dop853 import accelerations
 from mcmj.simulation.simulation import Simulation
 from mcmj.simulation.stepsize.limit import stability_limit
-from mcmj.utils.errors import DivergenceError, StabilityWarning, UnknownNameError
+from mcmj.utils.errors import DivergenceError, StabilityWarning
 from mcmj.utils.progress import OnSteps
-from mcmj.utils.validation import (
-    Array,
-    require_count,
-    require_duration,
-    require_number,
-    require_seed,
-)
+from mcmj.utils.validation import Array
 
 OVERSHOOT = 10.0
 LEAST_STEPS = 400  # of a run: time for a slow growth
 LONGEST = 1.0  # s: no longer step is tried
-STEPS = ("measured", "at_rest", "safe", "blow_up")  # columns of a row
-
-
-@dataclass(frozen=True)
-class Config:
-    """What to run.
-
-    Attributes:
-        cases: names from CASES.
-        integrators: MuJoCo's, or mcmj's own.
-        seed: of the bodies and the starts.
-        duration: of a run [s]; shorter where `most_steps` does not reach it.
-        most_steps: of a run.
-        precision: the bisection ends when its bounds differ by this share.
-    """
-
-    cases: tuple[str, ...] = ()
-    integrators: tuple[str, ...] = tuple(INTEGRATORS)
-    seed: int = 0
-    duration: float = 1.0
-    most_steps: int = 20_000
-    precision: float = 0.03
-
-    def __post_init__(self) -> None:
-        require_seed("seed", self.seed)
-        require_count("most_steps", self.most_steps, 100)
-        require_duration("duration", self.duration)
-        require_number("precision", self.precision, 0.0, 1.0, open_low=True)
-        if not self.cases:
-            object.__setattr__(self, "cases", tuple(CASES))
-        for kind, names, known in (
-            ("hard case", self.cases, CASES),
-            ("integrator", self.integrators, INTEGRATORS),
-        ):
-            for name in names:
-                if name not in known:
-                    raise UnknownNameError(kind, name, known)
-
-
-@dataclass(frozen=True)
-class Row:
-    """One case under one integrator; steps in s, infinite if none up to LONGEST fails.
-
-    Attributes:
-        measured: largest stable step.
-        at_rest, safe, blow_up: predictions, see above.
-    """
-
-    case: str
-    integrator: str
-    measured: float
-    at_rest: float
-    safe: float
-    blow_up: float
-
-
-@dataclass(frozen=True)
-class Result:
-    """All rows, and the largest elongation [m] and rate [m/s] in every case."""
-
-    config: Config
-    rows: tuple[Row, ...]
-    amplitudes: dict[str, tuple[float, float]]
-
-    @property
-    def metrics(self) -> dict[str, object]:
-        """metrics.<case>.<integrator>: steps in ms, and how they compare; null: unbounded."""
-        table: dict[str, object] = {}
-        for case in self.config.cases:
-            elongation, speed = self.amplitudes[case]
-            entry: dict[str, object] = {"elongation": elongation, "speed": speed}
-            for row in self.rows:
-                if row.case == case:
-                    entry[row.integrator] = {
-                        f"{name}_ms": 1e3 * getattr(row, name) for name in STEPS
-                    } | {"measured_over_blow_up": row.measured / row.blow_up}
-            table[case] = entry
-        return table
 
 
 def run(config: Config, *, on_steps: OnSteps = lambda steps: None) -> Result:

@@ -11,7 +11,8 @@ from mcmj.core.random_body import draw_body
 from mcmj.experiments.base import Experiment
 from mcmj.experiments.limit_cycle.config import Config, total_steps
 from mcmj.experiments.limit_cycle.figure import figures
-from mcmj.experiments.limit_cycle.run import Result, run
+from mcmj.experiments.limit_cycle.result import Result
+from mcmj.experiments.limit_cycle.run import run
 from mcmj.experiments.limit_cycle.seeds import SuccessOfSeeds
 from mcmj.metrics.success_rates import rate_cells
 from mcmj.mjcf.write import to_mjcf

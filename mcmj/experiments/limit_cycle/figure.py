@@ -3,7 +3,7 @@
 import numpy as np
 from matplotlib.figure import Figure
 
-from mcmj.experiments.limit_cycle.run import Result
+from mcmj.experiments.limit_cycle.result import Result
 from mcmj.experiments.limit_cycle.seeds import SuccessOfSeeds
 from mcmj.pictures.plotting import (
     TITLES,

@@ -6,8 +6,10 @@ from rich.console import Console
 from rich.table import Table
 
 from mcmj.experiments.base import Experiment
+from mcmj.experiments.perturb.config import Config, total_steps
 from mcmj.experiments.perturb.figure import figures
-from mcmj.experiments.perturb.run import Config, Result, run, total_steps
+from mcmj.experiments.perturb.result import Result
+from mcmj.experiments.perturb.run import run
 from mcmj.utils import files
 from mcmj.utils.progress import progress_bar
 

@@ -5,7 +5,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from mcmj.experiments.perturb.run import Recovery, Result
+from mcmj.experiments.perturb.result import Recovery, Result
 from mcmj.pictures.plotting import OUTPUT_STYLES, TARGET_STYLE, draw_orbit, new_figure
 from mcmj.targets.limit_cycles import Target
 from mcmj.utils.colours import BLACK, CHANGE_COLOUR, RECOVERED_COLOUR, TARGET_COLOUR

@@ -7,8 +7,10 @@ from rich.console import Console
 from rich.table import Table
 
 from mcmj.experiments.base import Experiment
+from mcmj.experiments.prune.config import Config, total_runs
 from mcmj.experiments.prune.figure import figures
-from mcmj.experiments.prune.run import Config, Result, run, total_runs
+from mcmj.experiments.prune.result import Result
+from mcmj.experiments.prune.run import run
 from mcmj.utils import files
 from mcmj.utils.progress import progress_bar
 

@@ -5,7 +5,7 @@ from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 
-from mcmj.experiments.prune.run import Result
+from mcmj.experiments.prune.result import Result
 from mcmj.pictures.plotting import draw_body, new_figure
 from mcmj.utils.colours import GROUP_COLOURS, TARGET_COLOUR
 

@@ -8,7 +8,8 @@ from pathlib import Path
 from rich.console import Console
 
 from mcmj.experiments.base import Experiment
-from mcmj.experiments.render.run import Config, run
+from mcmj.experiments.render.config import Config
+from mcmj.experiments.render.run import run
 from mcmj.learning.lessons import Teaching
 from mcmj.pictures.film import Film
 from mcmj.pictures.rendering import Report, write_film

@@ -8,8 +8,10 @@ from rich.console import Console
 from rich.table import Table
 
 from mcmj.experiments.base import Experiment
+from mcmj.experiments.speed_accuracy.config import Config
 from mcmj.experiments.speed_accuracy.figure import figures
-from mcmj.experiments.speed_accuracy.run import BASE, Config, Result, run
+from mcmj.experiments.speed_accuracy.result import Result
+from mcmj.experiments.speed_accuracy.run import BASE, run
 from mcmj.utils import files
 from mcmj.utils.progress import progress_bar
 

@@ -6,7 +6,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from mcmj.core.integrators import INTEGRATORS
-from mcmj.experiments.speed_accuracy.run import Cell, Result
+from mcmj.experiments.speed_accuracy.result import Cell, Result
 from mcmj.pictures.plotting import INTEGRATOR_MARKS, new_figure
 from mcmj.utils.colours import GREY, INTEGRATOR_COLOURS, Colour
 

@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from mcmj.experiments.swing_up.run import Result, SwingUp
+from mcmj.experiments.swing_up.result import Result, SwingUp
 from mcmj.pictures.plotting import OUTPUT_STYLES, TITLES, draw_orbit, new_figure, output_handles
 from mcmj.utils.colours import CHANGE_COLOUR
 

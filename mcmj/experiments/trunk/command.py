@@ -9,7 +9,8 @@ from rich.table import Table
 from mcmj.experiments.base import Experiment
 from mcmj.experiments.trunk.config import Config, total_seconds
 from mcmj.experiments.trunk.figure import figures
-from mcmj.experiments.trunk.run import Result, run
+from mcmj.experiments.trunk.result import Result
+from mcmj.experiments.trunk.run import run
 from mcmj.robots.trunk_walker import TIMESTEP
 from mcmj.utils import files
 from mcmj.utils.progress import progress_bar

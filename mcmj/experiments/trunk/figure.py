@@ -4,7 +4,7 @@ from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 
-from mcmj.experiments.trunk.run import Result
+from mcmj.experiments.trunk.result import Result
 from mcmj.pictures.footfalls import draw_stance
 from mcmj.pictures.plotting import OUTPUT_STYLES, TARGET_STYLE, best_phase, new_figure
 from mcmj.robots.trunk import Trunk

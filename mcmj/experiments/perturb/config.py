@@ -1,0 +1,106 @@
+"""What the perturbation experiment runs: its Config."""
+
+from dataclasses import dataclass, field, replace
+
+from mcmj.core.random_body import BodySettings
+from mcmj.learning.teaching import Teaching
+from mcmj.metrics import orbits
+from mcmj.simulation.run_phases import Phase, RandomForces
+from mcmj.targets.named import named_target
+from mcmj.utils.errors import InvalidArgumentError
+from mcmj.utils.validation import (
+    require_count,
+    require_duration,
+    require_number,
+    require_seed,
+    require_timestep,
+)
+
+# chosen by the recoveries of bodies 0 to 19 and 100 to 239, on the twin
+DRAWN = BodySettings(nodes=20, feedback_fraction=0.5, d1=(0.1, 2.0))
+TAUGHT = Teaching(
+    noise=0.4,
+    ridge_per_row=1e-6,  # as against a length noise of 1e-3 m
+    rest_runs=2,  # they widen the basin: a frozen output leads far from the orbit
+    rest_duration=30.0,
+    rest_weight=1e-2,
+)
+
+
+@dataclass(frozen=True)
+class Config:
+    """What to run.
+
+    Attributes:
+        task: van_der_pol, .., a .csv file or package.module:function.
+        body: a body file, or the name of a body that comes with mcmj; default: a random body.
+            It is always taught: readouts in the file are not used. Integrator and spring law
+            are the file's, unless the engine is the twin.
+        seed: of the random body, the noises and the forces.
+        seeds: number of bodies of consecutive seeds for the table of successes.
+        before, window, after: lengths of the phases: undisturbed, disturbed, free again [s].
+        force: random forces are uniform in [-force, force] on every node [N].
+        sensor_noise: standard deviation of the noise on the lengths [m].
+        noise_curve: amplitudes of the curve of noise tolerance [m].
+        tolerance: of the target orbit, over its RMS radius, for recovery and for success.
+        error_window: the orbit error is that of this last part [s].
+        timestep: control and physics step [s].
+        engine: mujoco, or twin: faster, the same to rounding.
+        settings: what a random body is drawn from.
+        teaching: how the readout is taught; with a ridge it stands 100 x more sensor noise.
+    """
+
+    task: str = "quadratic"
+    body: str | None = None
+    seed: int = 0
+    seeds: int = 1
+    before: float = 10.0
+    window: float = 10.0
+    after: float = 40.0
+    force: float = 10.0
+    sensor_noise: float = 0.1
+    noise_curve: tuple[float, ...] = (0.03, 0.1, 0.3, 1.0, 3.0, 10.0)
+    tolerance: float = 0.05
+    error_window: float = 20.0
+    timestep: float = 1e-3
+    engine: str = "mujoco"
+    settings: BodySettings = DRAWN
+    teaching: Teaching = field(default_factory=lambda: TAUGHT)
+
+    def __post_init__(self) -> None:
+        period = named_target(self.task).period
+        require_seed("seed", self.seed)
+        require_count("seeds", self.seeds, 1)
+        require_timestep("timestep", self.timestep)
+        for name in ("before", "window", "after"):
+            require_duration(name, getattr(self, name), self.timestep)
+        for name in ("force", "sensor_noise", "tolerance"):
+            require_number(name, getattr(self, name), 0.0, open_low=True)
+        require_number("error_window", self.error_window, 0.0, self.after, open_low=True)
+        for std in self.noise_curve:
+            require_number("noise_curve", std, 0.0, open_low=True)
+        if self.body is not None and (self.settings != DRAWN or self.seeds > 1):
+            raise InvalidArgumentError("body", "no settings or seeds beside it", self.body)
+        require_number("after", self.after, 2 * period)
+        require_number("error_window", self.error_window, orbits.PERIODS_NEEDED * period)
+
+    @property
+    def perturbations(self) -> dict[str, Phase]:
+        """The disturbed phases of Fig. 6, by name."""
+        disturbed = Phase(self.window)
+        return {
+            **{
+                f"frozen_x{output + 1}": replace(disturbed, freeze=(output,))
+                for output in range(named_target(self.task).n_outputs)
+            },
+            "random_forces": replace(disturbed, forces=RandomForces(self.force)),
+            "length_noise": replace(disturbed, length_noise=self.sensor_noise),
+        }
+
+
+def total_steps(config: Config) -> int:
+    """Control steps of a whole run, for a progress bar."""
+    runs = 1 + len(config.perturbations) + len(config.noise_curve)
+    run_length = config.before + config.window + config.after
+    seconds = config.teaching.total + runs * run_length
+    return config.seeds * round(seconds / config.timestep)

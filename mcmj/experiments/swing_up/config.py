@@ -1,0 +1,83 @@
+"""What the swing-up experiment runs: its Config."""
+
+from dataclasses import dataclass, field, replace
+
+from mcmj.core.random_body import BodySettings
+from mcmj.experiments.limit_cycle import run as limit_cycle
+from mcmj.learning.lessons import Teaching
+from mcmj.learning.practice import Practice
+from mcmj.utils.errors import InvalidArgumentError
+from mcmj.utils.validation import require_count, require_number
+
+TAUGHT = Teaching(duration=240.0, rest_runs=2, rest_duration=30.0, rest_weight=1e-2)
+
+
+@dataclass(frozen=True)
+class Config:
+    """What to run.
+
+    Attributes:
+        task: van_der_pol, quadratic, lissajous, or all of these (by the same body); a gait; a .csv
+            file; package.module:function.
+        body: a body file, or the name of a body that comes with mcmj; default: the general
+            body, unless a seed, several seeds or changed settings ask for random ones.
+        seed: of the random body and of the noise; default 0.
+        seeds: number of random bodies of consecutive seeds, for rates.
+        free_run: length of the run from rest [s].
+        window: the orbit error is that of this last part of it [s].
+        tolerance: of the target orbit, over its RMS radius, for the swing-up time and for
+            success.
+        timestep: control and physics step [s].
+        engine: mujoco, or twin: faster, the same to rounding.
+        kicks: number of further starts, with the nodes kicked, that show how wide the way
+            onto the orbit is; 0: none.
+        kick_speed: standard deviation of their first velocities [m/s]; on the orbit nodes move
+            at about 0.05 m/s.
+        settings: what a random body is drawn from.
+        teaching: how the readout is taught, runs from rest included.
+        practice: how the body then practises from rest.
+    """
+
+    task: str = "all"
+    body: str | None = None
+    seed: int | None = None
+    seeds: int = 1
+    free_run: float = 80.0
+    window: float = 20.0
+    tolerance: float = 0.05
+    timestep: float = 1e-3
+    engine: str = "mujoco"
+    kicks: int = 8
+    kick_speed: float = 0.02
+    settings: BodySettings = field(default_factory=BodySettings)
+    teaching: Teaching = field(default_factory=lambda: TAUGHT)
+    practice: Practice = field(default_factory=Practice)
+
+    def __post_init__(self) -> None:
+        require_count("seeds", self.seeds, 1)
+        require_count("kicks", self.kicks, 0)
+        require_number("kick_speed", self.kick_speed, 0.0)
+        require_number("tolerance", self.tolerance, 0.0, open_low=True)
+        if self.body is not None and self.seeds > 1:
+            raise InvalidArgumentError("seeds", "1 beside a body", self.seeds)
+        self.of_seed(0)  # checks the rest
+
+    def of_seed(self, index: int) -> limit_cycle.Config:
+        """The limit-cycle experiment of the body number `index`."""
+        one = limit_cycle.Config(
+            task=self.task,
+            body=self.body,
+            seed=self.seed,
+            free_run=self.free_run,
+            window=self.window,
+            timestep=self.timestep,
+            settings=self.settings,
+            teaching=self.teaching,
+        )
+        return one if self.seeds == 1 else replace(one, seed=one.noise_seed + index)
+
+
+def total_steps(config: Config) -> int:
+    """Control steps of a whole run, for a progress bar; rounds of practice are not foreseen."""
+    seconds = config.teaching.total + config.practice.trial + (1 + config.kicks) * config.free_run
+    return config.seeds * len(config.of_seed(0).targets) * round(seconds / config.timestep)
