@@ -151,11 +151,13 @@ def compile_control() -> CFunction:
                 kept[0] = 0.0
         for k in range(n_drives):
             ctrl[numba.int64(drives[3 * k])] = 0.0
-        for k in range(n_drives):
+        last, value = -1, 0.0
+        for k in range(n_drives):  # those of a channel are neighbours
             channel = numba.int64(drives[3 * k + 1])
-            value = ctrl[first + channel]
-            if channel < n_outputs and time >= values[7]:
-                value += output(model, sensors, addresses, n_signals, first + channel)
+            if channel != last:
+                last, value = channel, ctrl[first + channel]
+                if channel < n_outputs and time >= values[7]:
+                    value += output(model, sensors, addresses, n_signals, first + channel)
             ctrl[numba.int64(drives[3 * k])] += drives[3 * k + 2] * value
 
     return numba.cfunc(types.void(WORDS, WORDS), cache=True)(control).ctypes
