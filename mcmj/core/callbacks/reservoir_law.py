@@ -17,6 +17,7 @@ puts them back at its next step.
 """
 
 from collections.abc import Sequence
+from typing import Any, NamedTuple
 
 import numba
 import numpy as np
@@ -29,7 +30,8 @@ RESERVOIR_TAG = 201205.0  # six digits are what MuJoCo's writer of MJCF keeps
 NUMERIC = "mcmj_reservoir"
 N_BIAS_PARAMETERS = 10  # mjNBIAS
 _HEAD = 9
-_FAST = {"contract", "reassoc", "nsz", "arcp"}  # NaN and infinity keep their meaning
+# NaN and infinity keep their meaning
+COMPILE: dict[str, Any] = {"cache": True, "fastmath": {"contract", "reassoc", "nsz", "arcp"}}
 
 
 def block(
@@ -60,104 +62,141 @@ def block(
     return [*map(float, (*head, *signals, *late)), *(float(x) for drive in drives for x in drive)]
 
 
+class Offsets(NamedTuple):
+    """Where the law's fields are in mjModel and mjData, in words; `time` in bytes."""
+
+    nu: int
+    nuser_actuator: int
+    nsensordata: int
+    nuserdata: int
+    nnumeric: int
+    nnumericdata: int
+    numeric_adr: int
+    numeric_size: int
+    numeric_data: int
+    actuator_user: int
+    actuator_biasprm: int
+    ctrl: int
+    sensordata: int
+    userdata: int
+    time: int
+
+
+class Law(NamedTuple):
+    """A model's block, checked against its sizes; see `block`."""
+
+    outputs: int
+    first: int
+    clock: int
+    signals: int
+    late: int
+    drives: int
+    memory: int
+
+
 def compile_control() -> CFunction:
     """The mjcb_control callback. Offsets are closure variables: Numba's cache keys on them."""
-    model_at = word_offsets(
-        "mjModel",
-        ["nu", "nuser_actuator", "nsensordata", "nuserdata", "nnumeric", "nnumericdata",
-         "numeric_adr", "numeric_size", "numeric_data", "actuator_user", "actuator_biasprm"],
-    )  # fmt: skip
-    data_at = word_offsets("mjData", ["ctrl", "sensordata", "userdata"])
-    nu_at, n_user_at, n_data_at = (
-        model_at[name] for name in ("nu", "nuser_actuator", "nsensordata")
-    )
-    n_userdata_at, userdata_at = model_at["nuserdata"], data_at["userdata"]
-    n_numeric_at, n_numericdata_at = model_at["nnumeric"], model_at["nnumericdata"]
-    adr_at, size_at, values_at = (
-        model_at[name] for name in ("numeric_adr", "numeric_size", "numeric_data")
-    )
-    user_at, parameters_at = model_at["actuator_user"], model_at["actuator_biasprm"]
-    ctrl_at, sensors_at, time_at = (
-        data_at["ctrl"],
-        data_at["sensordata"],
-        byte_offset("mjData", "time"),
-    )
-
-    @numba.njit(cache=True)
-    def found(model):
-        """Where the reservoir's block begins in the custom numerics, and its size; -1 without."""
-        addresses, sizes = integers(model[adr_at]), integers(model[size_at])
-        values = doubles(model[values_at])
-        for i in range(model[n_numeric_at]):
-            fits = sizes[i] >= _HEAD and 0 <= addresses[i] <= model[n_numericdata_at] - sizes[i]
-            if fits and values[addresses[i]] == RESERVOIR_TAG:
-                return numba.int64(addresses[i]), numba.int64(sizes[i])
-        return numba.int64(-1), numba.int64(0)
-
-    @numba.njit(cache=True)
-    def inside(value, end):
-        """Whether a number of a model is a whole one from 0 to end - 1; NaN is not."""
-        return 0.0 <= value < end and value == np.floor(value)
-
-    @numba.njit(cache=True, fastmath=_FAST)
-    def output(model, sensors, addresses, n_signals, channel):
-        """y of a channel, its gate applied."""
-        gate = doubles(model[parameters_at])[channel * N_BIAS_PARAMETERS]
-        if gate == 0.0:
-            return 0.0
-        weights = doubles(model[user_at] + 8 * model[n_user_at] * channel)
-        total = 0.0
-        for j in range(n_signals):
-            total += weights[j] * sensors[numba.int64(addresses[j])]
-        return gate * (total + weights[n_signals])
+    model_fields, data_fields = Offsets._fields[:11], Offsets._fields[11:14]
+    words = word_offsets("mjModel", model_fields) | word_offsets("mjData", data_fields)
+    at = Offsets(**words, time=byte_offset("mjData", "time"))
 
     def control(model, data):
-        start, size = found(model)
+        start, size = find_block(model, at)
         if start < 0:
             return
-        values = numba.carray(doubles(model[values_at] + 8 * start), size)
-        nu, n_data = model[nu_at], model[n_data_at]
-        whole = inside(values[1], nu + 1) and inside(values[2], nu) and inside(values[3], n_data)
-        whole &= inside(values[4], model[n_user_at]) and inside(values[5], values[4] + 1.0)
-        if not (whole and inside(values[6], size) and inside(values[8], model[n_userdata_at] + 1)):
-            return  # a model that mcmj did not write
-        n_outputs, first, clock = (
-            numba.int64(values[1]), numba.int64(values[2]), numba.int64(values[3]),
-        )  # fmt: skip
-        n_signals, n_late, n_drives = (
-            numba.int64(values[4]), numba.int64(values[5]), numba.int64(values[6]),
-        )  # fmt: skip
-        memory, n_heard = numba.int64(values[8]), n_signals + n_late
-        if n_signals < 1 or _HEAD + n_heard + 3 * n_drives != size or first + n_outputs > nu:
-            return
-        if n_late > 0 and memory + 1 + n_late > model[n_userdata_at]:
-            return
-        sensors, ctrl = doubles(data[sensors_at]), doubles(data[ctrl_at])
-        time = doubles(address_of(data) + time_at)[0]
-        if sensors[clock] != time:
-            return  # a later stage of RK4
-        addresses, drives = values[_HEAD : _HEAD + n_heard], values[_HEAD + n_heard :]
-        for j in range(n_heard):
-            if not inside(addresses[j], n_data):
-                return
-        for k in range(n_drives):
-            if not (inside(drives[3 * k], first) and inside(drives[3 * k + 1], nu - first)):
-                return
-        if n_late > 0:
-            kept = doubles(data[userdata_at] + 8 * memory)
-            if kept[0] == 1.0:  # restored
-                for j in range(n_late):
-                    sensors[numba.int64(addresses[n_signals + j])] = kept[1 + j]
-                kept[0] = 0.0
-        for k in range(n_drives):
-            ctrl[numba.int64(drives[3 * k])] = 0.0
-        last, value = -1, 0.0
-        for k in range(n_drives):  # those of a channel are neighbours
-            channel = numba.int64(drives[3 * k + 1])
-            if channel != last:
-                last, value = channel, ctrl[first + channel]
-                if channel < n_outputs and time >= values[7]:
-                    value += output(model, sensors, addresses, n_signals, first + channel)
-            ctrl[numba.int64(drives[3 * k])] += drives[3 * k + 2] * value
+        values = numba.carray(doubles(model[at.numeric_data] + 8 * start), size)
+        law = read_law(values, model, at)
+        time = doubles(address_of(data) + at.time)[0]
+        if law.signals == 0 or doubles(data[at.sensordata])[law.clock] != time:
+            return  # not ours; or a later stage of RK4
+        put_back(values, law, data, at)
+        set_controls(values, law, model, data, at, time >= values[7])
 
     return numba.cfunc(types.void(WORDS, WORDS), cache=True)(control).ctypes
+
+
+@numba.njit(**COMPILE)
+def find_block(model, at):
+    """Where the reservoir's block begins in the custom numerics, and its size; -1 without."""
+    addresses, sizes = integers(model[at.numeric_adr]), integers(model[at.numeric_size])
+    values = doubles(model[at.numeric_data])
+    for i in range(model[at.nnumeric]):
+        last = model[at.nnumericdata] - sizes[i]
+        fits = sizes[i] >= _HEAD and 0 <= addresses[i] <= last
+        if fits and values[addresses[i]] == RESERVOIR_TAG:
+            return numba.int64(addresses[i]), numba.int64(sizes[i])
+    return numba.int64(-1), numba.int64(0)
+
+
+@numba.njit(**COMPILE)
+def whole(value, end):
+    """A number of a model if it is a whole one from 0 to end - 1, else -1; NaN is not."""
+    return numba.int64(value) if 0.0 <= value < end and value == np.floor(value) else -1
+
+
+@numba.njit(**COMPILE)
+def read_law(values, model, at):
+    """The block as a Law; one without signals if anything in it is out of bounds."""
+    nothing = Law(0, 0, 0, 0, 0, 0, 0)
+    nu, n_data = model[at.nu], model[at.nsensordata]
+    signals = whole(values[4], model[at.nuser_actuator])
+    law = Law(
+        whole(values[1], nu + 1), whole(values[2], nu), whole(values[3], n_data), signals,
+        whole(values[5], signals + 1), whole(values[6], values.size),
+        whole(values[8], model[at.nuserdata] + 1),
+    )  # fmt: skip
+    if min(law) < 0 or law.first + law.outputs > nu:
+        return nothing
+    heard = law.signals + law.late
+    if _HEAD + heard + 3 * law.drives != values.size:
+        return nothing
+    if law.late > 0 and law.memory + 1 + law.late > model[at.nuserdata]:
+        return nothing
+    for j in range(heard):
+        if whole(values[_HEAD + j], n_data) < 0:
+            return nothing
+    for k in range(_HEAD + heard, values.size, 3):
+        if whole(values[k], law.first) < 0 or whole(values[k + 1], nu - law.first) < 0:
+            return nothing
+    return law
+
+
+@numba.njit(**COMPILE)
+def put_back(values, law, data, at):
+    """Late sensors of a state that was restored."""
+    if law.late == 0:
+        return
+    kept, sensors = doubles(data[at.userdata] + 8 * law.memory), doubles(data[at.sensordata])
+    if kept[0] == 1.0:
+        for j in range(law.late):
+            sensors[numba.int64(values[_HEAD + law.signals + j])] = kept[1 + j]
+        kept[0] = 0.0
+
+
+@numba.njit(**COMPILE)
+def output(values, law, model, data, at, actuator):
+    """g y of a channel, given its actuator."""
+    gate = doubles(model[at.actuator_biasprm])[actuator * N_BIAS_PARAMETERS]
+    if gate == 0.0:
+        return 0.0
+    weights = doubles(model[at.actuator_user] + 8 * model[at.nuser_actuator] * actuator)
+    sensors, total = doubles(data[at.sensordata]), 0.0
+    for j in range(law.signals):
+        total += weights[j] * sensors[numba.int64(values[_HEAD + j])]
+    return gate * (total + weights[law.signals])
+
+
+@numba.njit(**COMPILE)
+def set_controls(values, law, model, data, at, heard):
+    """ctrl of all actuators that are driven; `heard` is false while delayed sensors are empty."""
+    ctrl, begin = doubles(data[at.ctrl]), _HEAD + law.signals + law.late
+    for k in range(begin, values.size, 3):
+        ctrl[numba.int64(values[k])] = 0.0
+    last, value = -1, 0.0
+    for k in range(begin, values.size, 3):  # those of a channel are neighbours
+        channel = numba.int64(values[k + 1])
+        if channel != last:
+            last, value = channel, ctrl[law.first + channel]
+            if channel < law.outputs and heard:
+                value += output(values, law, model, data, at, law.first + channel)
+        ctrl[numba.int64(values[k])] += values[k + 2] * value
