@@ -9,9 +9,11 @@ from typing import Any
 
 from matplotlib.figure import Figure
 from rich.console import Console
+from rich.table import Table
 
 from mcmj.pictures.plotting import save
 from mcmj.utils import files
+from mcmj.utils.progress import OnSteps, progress_bar
 
 
 @dataclass(frozen=True)
@@ -73,6 +75,21 @@ class Experiment:
         module = self.config.__module__
         place = module.rpartition(".")[0] if module.startswith("mcmj.experiments.") else module
         return sys.modules[place].__doc__ or ""
+
+
+def counting(
+    label: str, total: Callable[[Any], int]
+) -> Callable[[Any, bool], AbstractContextManager[OnSteps]]:
+    """A bar over what a run counts, steps or bodies or tasks: `total` of a config."""
+    return lambda config, quiet: progress_bar(label, total(config), quiet=quiet)
+
+
+def table_of(title: str, *columns: str, words: int = 1) -> Table:
+    """An empty table: so many columns of words, the others of numbers."""
+    table = Table(*columns[:words], title=title)
+    for name in columns[words:]:
+        table.add_column(name, justify="right")
+    return table
 
 
 def carry_out(experiment: Experiment, config: Any, output: Output, folder: Path) -> None:

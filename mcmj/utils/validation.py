@@ -103,14 +103,23 @@ def require_count(name: str, value: int, low: int, high: int | None = None) -> N
         raise InvalidArgumentError(name, wanted, repr(value))
 
 
+def require_name(kind: str, known: Collection[str], *given: str) -> None:
+    """Check that names are known ones.
+
+    Raises:
+        UnknownNameError: one of them is not.
+    """
+    for name in given:
+        if name not in known:
+            raise UnknownNameError(kind, name, known)
+
+
 def require_names(kind: str, given: Sequence[str], known: Collection[str]) -> None:
     """Check that names are known ones, at least one, each once.
 
     Raises:
         InvalidArgumentError, UnknownNameError: they are not.
     """
-    for name in given:
-        if name not in known:
-            raise UnknownNameError(kind, name, known)
+    require_name(kind, known, *given)
     if not given or len(set(given)) < len(given):
         raise InvalidArgumentError(f"{kind}s", "at least one, each once", given)

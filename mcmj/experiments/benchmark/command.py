@@ -5,11 +5,10 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
-from mcmj.experiments.base import Experiment
+from mcmj.experiments.base import Experiment, counting
 from mcmj.experiments.benchmark.figure import figures
 from mcmj.experiments.benchmark.run import PARTS, Config, Result, run
 from mcmj.utils import files
-from mcmj.utils.progress import progress_bar
 
 
 def show(result: Result, console: Console) -> None:
@@ -30,6 +29,6 @@ EXPERIMENT = Experiment(
     config=Config,
     run=run,
     show=show,
-    bar=lambda config, quiet: progress_bar("measuring", len(PARTS), quiet=quiet),
+    bar=counting("measuring", lambda config: len(PARTS)),
     figures=figures,
 )

@@ -1,21 +1,18 @@
 """The command: capacity."""
 
 from rich.console import Console
-from rich.table import Table
 
-from mcmj.experiments.base import Experiment
+from mcmj.experiments.base import Experiment, counting, table_of
 from mcmj.experiments.capacity.config import Config, total_bodies
 from mcmj.experiments.capacity.figure import figures
 from mcmj.experiments.capacity.result import Result
 from mcmj.experiments.capacity.run import run
-from mcmj.utils.progress import progress_bar
 
 
 def show(result: Result, console: Console) -> None:
     """The result as tables."""
-    table = Table(title=f"a body of {result.n_springs} springs, {result.config.symbols} symbols")
-    table.add_column("measure")
-    table.add_column("value", justify="right")
+    title = f"a body of {result.n_springs} springs, {result.config.symbols} symbols"
+    table = table_of(title, "measure", "value")
     for name, value in result.worth.measures.items():
         table.add_row(name, f"{value:.1f}")
     for degree, values in result.by_delay.items():
@@ -28,6 +25,6 @@ EXPERIMENT = Experiment(
     config=Config,
     run=run,
     show=show,
-    bar=lambda config, quiet: progress_bar("bodies", total_bodies(config), quiet=quiet),
+    bar=counting("bodies", total_bodies),
     figures=figures,
 )

@@ -3,12 +3,11 @@
 from rich.console import Console
 from rich.table import Table
 
-from mcmj.experiments.base import Experiment
+from mcmj.experiments.base import Experiment, counting
 from mcmj.experiments.certify.config import Config
 from mcmj.experiments.certify.figure import figures
 from mcmj.experiments.certify.result import Result, in_words
 from mcmj.experiments.certify.run import STAGES, run
-from mcmj.utils.progress import progress_bar
 
 
 def show(result: Result, console: Console) -> None:
@@ -24,7 +23,7 @@ EXPERIMENT = Experiment(
     config=Config,
     run=run,
     show=show,
-    bar=lambda config, quiet: progress_bar("certifying", len(STAGES), quiet=quiet),
+    bar=counting("certifying", lambda config: len(STAGES)),
     seed=lambda config: config.noise_seed,
     figures=figures,
 )

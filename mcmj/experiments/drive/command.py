@@ -4,13 +4,12 @@ from pathlib import Path
 
 from rich.console import Console
 
-from mcmj.experiments.base import Experiment
+from mcmj.experiments.base import Experiment, counting
 from mcmj.experiments.drive.config import Config, total_episodes
 from mcmj.experiments.drive.figure import figures
 from mcmj.experiments.drive.result import Episode, Result
 from mcmj.experiments.drive.run import run
 from mcmj.utils import files
-from mcmj.utils.progress import progress_bar
 
 
 def write(result: Result, folder: Path) -> None:
@@ -40,7 +39,7 @@ EXPERIMENT = Experiment(
     config=Config,
     run=run,
     show=show,
-    bar=lambda config, quiet: progress_bar("learning", total_episodes(config), quiet=quiet),
+    bar=counting("learning", total_episodes),
     write=write,
     figures=figures,
 )

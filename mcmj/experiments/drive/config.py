@@ -4,7 +4,12 @@ from dataclasses import dataclass
 
 from mcmj.core.random_body import MOST_NODES
 from mcmj.targets.named import named_target
-from mcmj.utils.validation import require_count, require_duration, require_number, require_seed
+from mcmj.utils.validation import (
+    require_count,
+    require_duration,
+    require_number,
+    require_seed,
+)
 
 
 @dataclass(frozen=True)

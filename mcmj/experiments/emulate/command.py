@@ -1,23 +1,19 @@
 """The command: emulate."""
 
 from rich.console import Console
-from rich.table import Table
 
-from mcmj.experiments.base import Experiment
+from mcmj.experiments.base import Experiment, counting, table_of
 from mcmj.experiments.emulate.config import REPORTED, Config
 from mcmj.experiments.emulate.figure import figures
 from mcmj.experiments.emulate.result import Result
 from mcmj.experiments.emulate.run import run
-from mcmj.utils.progress import progress_bar
 
 
 def show(result: Result, console: Console) -> None:
     """The result as tables."""
     config = result.config
-    table = Table(title=f"error of the emulation at {REPORTED:g} ms, {config.horizon:g} s (order)")
-    table.add_column("target")
-    for name in config.integrators:
-        table.add_column(name, justify="right")
+    title = f"error of the emulation at {REPORTED:g} ms, {config.horizon:g} s (order)"
+    table = table_of(title, "target", *config.integrators)
     for target, methods in result.cells.items():
         cells = []
         for name, steps in methods.items():
@@ -42,6 +38,6 @@ EXPERIMENT = Experiment(
     config=Config,
     run=run,
     show=show,
-    bar=lambda config, quiet: progress_bar("targets", len(config.names), quiet=quiet),
+    bar=counting("targets", lambda config: len(config.names)),
     figures=figures,
 )

@@ -4,8 +4,14 @@ from dataclasses import dataclass
 
 from mcmj.core.integrators import INTEGRATORS
 from mcmj.experiments.emulate.systems import SYSTEMS
-from mcmj.utils.errors import InvalidArgumentError, UnknownNameError
-from mcmj.utils.validation import SHORTEST_STEP, require_duration, require_number, require_seed
+from mcmj.utils.errors import InvalidArgumentError
+from mcmj.utils.validation import (
+    SHORTEST_STEP,
+    require_duration,
+    require_name,
+    require_number,
+    require_seed,
+)
 
 REPORTED = 1.0  # ms: the step of the errors in metrics.json
 
@@ -33,13 +39,8 @@ class Config:
     seed: int = 0
 
     def __post_init__(self) -> None:
-        for kind, names, valid in (
-            ("target", self.targets, tuple(SYSTEMS)),
-            ("integrator", self.integrators, INTEGRATORS),
-        ):
-            for name in names:
-                if name not in valid:
-                    raise UnknownNameError(kind, name, valid)
+        require_name("target", SYSTEMS, *self.targets)
+        require_name("integrator", INTEGRATORS, *self.integrators)
         require_seed("seed", self.seed)
         for step in self.steps_ms:
             require_number("steps_ms", step, 1e3 * SHORTEST_STEP)

@@ -5,8 +5,14 @@ from dataclasses import dataclass, field
 from mcmj.core.integrators import DEFAULT_INTEGRATOR
 from mcmj.core.random_body import BodySettings
 from mcmj.experiments.filters.switching import SwitchConfig
-from mcmj.utils.errors import InvalidArgumentError, UnknownNameError
-from mcmj.utils.validation import require_count, require_duration, require_number, require_seed
+from mcmj.utils.errors import InvalidArgumentError
+from mcmj.utils.validation import (
+    require_count,
+    require_duration,
+    require_name,
+    require_number,
+    require_seed,
+)
 
 SAMPLED = ("volterra", "toolbox_narma")  # one input a millisecond
 IN_SYMBOLS = ("narma10", "delayed_recall")  # which share their input, and so one run
@@ -66,9 +72,7 @@ class Config:
     switch: SwitchConfig = field(default_factory=SwitchConfig)
 
     def __post_init__(self) -> None:
-        for name in self.tasks:
-            if name not in TASKS:
-                raise UnknownNameError("task", name, TASKS)
+        require_name("task", TASKS, *self.tasks)
         require_seed("seed", self.seed)
         for name in ("train", "washout", "test", "hold"):
             require_duration(name, getattr(self, name))

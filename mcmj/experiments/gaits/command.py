@@ -4,16 +4,14 @@ from pathlib import Path
 
 import numpy as np
 from rich.console import Console
-from rich.table import Table
 
-from mcmj.experiments.base import Experiment
+from mcmj.experiments.base import Experiment, counting, table_of
 from mcmj.experiments.gaits.config import Config, total_steps
 from mcmj.experiments.gaits.figure import figures
 from mcmj.experiments.gaits.result import Result
 from mcmj.experiments.gaits.run import run
 from mcmj.mjcf.write import to_mjcf
 from mcmj.utils import files
-from mcmj.utils.progress import progress_bar
 
 
 def write(result: Result, out: Path) -> None:
@@ -40,11 +38,9 @@ def write(result: Result, out: Path) -> None:
 def show(result: Result, console: Console) -> None:
     """The result as tables."""
     config, first = result.config, result.first
-    table = Table(title=f"last {config.window:g} s of {config.free_run:g} s in closed loop")
+    title = f"last {config.window:g} s of {config.free_run:g} s in closed loop"
     columns = ("orbit error", "period error", "phase lag error", "duty factor", "from rest after")
-    table.add_column("gait")
-    for column in columns:
-        table.add_column(column, justify="right")
+    table = table_of(title, "gait", *columns)
     for name, gait in first.gaits.items():
         errors = gait.free.errors
         table.add_row(
@@ -55,10 +51,8 @@ def show(result: Result, console: Console) -> None:
             " ".join(f"{duty:.3f}" for duty in gait.free.duty_factors),
             f"{gait.from_rest.time:.1f} s",
         )
-    switches = Table(title=f"{config.after:g} s after a switch: orbit error (switching time)")
-    switches.add_column("from \\ to")
-    for name in config.gaits:
-        switches.add_column(name, justify="right")
+    title = f"{config.after:g} s after a switch: orbit error (switching time)"
+    switches = table_of(title, "from \\ to", *config.gaits)
     for start in config.gaits:
         cells = []
         for end in config.gaits:
@@ -82,7 +76,7 @@ EXPERIMENT = Experiment(
     config=Config,
     run=run,
     show=show,
-    bar=lambda config, quiet: progress_bar("teaching, switching", total_steps(config), quiet=quiet),
+    bar=counting("teaching, switching", total_steps),
     seed=lambda config: config.first_seed,
     write=write,
     figures=figures,

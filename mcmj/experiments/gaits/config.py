@@ -10,11 +10,12 @@ from mcmj.learning.practice import Practice
 from mcmj.metrics import orbits
 from mcmj.mjcf.bundled import open_body
 from mcmj.targets.gaits import GAITS, LEGS, gait_target
-from mcmj.utils.errors import InvalidArgumentError, UnknownNameError
+from mcmj.utils.errors import InvalidArgumentError
 from mcmj.utils.validation import (
     Array,
     require_count,
     require_duration,
+    require_names,
     require_number,
     require_seed,
     require_timestep,
@@ -73,11 +74,7 @@ class Config:
     phases: int = 12
 
     def __post_init__(self) -> None:
-        for name in self.gaits:
-            if name not in GAITS:
-                raise UnknownNameError("gait", name, GAITS)
-        if not self.gaits or len(set(self.gaits)) < len(self.gaits):
-            raise InvalidArgumentError("gaits", "at least one, each once", self.gaits)
+        require_names("gait", self.gaits, GAITS)
         if self.seed is not None:
             require_seed("seed", self.seed)
         require_count("seeds", self.seeds, 1)

@@ -23,9 +23,9 @@ def resume(config: Config, folder: Path, on_steps: OnSetting) -> Result:
 def show(result: Result, console: Console) -> None:
     """The result as tables."""
     metrics: dict[str, Any] = result.metrics
-    table = Table(title=f"{result.config.judged} bodies that the search has not seen")
-    for column in ("settings", "successes", "95 % interval", "median score", "objective"):
-        table.add_column(column)
+    title = f"{result.config.judged} bodies that the search has not seen"
+    columns = ("settings", "successes", "95 % interval", "median score", "objective")
+    table = Table(*columns, title=title)
     for name in result.judged:
         row = metrics[name.replace("-", "_") + "_on_other_bodies"]
         median, objective = f"{row['median_score']:.3g}", f"{row['objective']:.3f}"

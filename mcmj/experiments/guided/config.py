@@ -9,8 +9,8 @@ import numpy as np
 from mcmj.search.experiment import Score, default_score, make_config
 from mcmj.search.overrides import override, parse_assignment, value_at
 from mcmj.search.space import MAX_SEED, MAX_TRIALS, Space, parse_dimension
-from mcmj.utils.errors import InvalidArgumentError, UnknownNameError
-from mcmj.utils.validation import Array, require_count, require_number
+from mcmj.utils.errors import InvalidArgumentError
+from mcmj.utils.validation import Array, require_count, require_name, require_number
 
 WORST_LOG = 1.0  # log10 of the score that counts for everything worse, blow-ups too
 
@@ -84,8 +84,7 @@ class Config:
         if self.confirm is not None:
             require_count("confirm", self.confirm, 0)
         require_number("threshold", self.threshold, -np.inf)
-        if self.objective not in OBJECTIVES:
-            raise UnknownNameError("objective", self.objective, OBJECTIVES)
+        require_name("objective", OBJECTIVES, self.objective)
         seen = range(self.first_seed, self.first_seed + self.bodies)
         if max(seen[0], self.judged_from) <= min(seen[-1], self._judged_seeds[-1]):
             raise InvalidArgumentError("judged_from", "seeds that the search does not use", seen)

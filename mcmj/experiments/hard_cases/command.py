@@ -7,13 +7,12 @@ from pathlib import Path
 from rich.console import Console
 from rich.table import Table
 
-from mcmj.experiments.base import Experiment
+from mcmj.experiments.base import Experiment, counting
 from mcmj.experiments.hard_cases.config import Config
 from mcmj.experiments.hard_cases.figure import figures
 from mcmj.experiments.hard_cases.result import STEPS, Result, Row
 from mcmj.experiments.hard_cases.run import LONGEST, run
 from mcmj.utils import files
-from mcmj.utils.progress import progress_bar
 
 
 def write(result: Result, folder: Path) -> None:
@@ -34,12 +33,8 @@ def to_csv(result: Result) -> str:
 
 def show(result: Result, console: Console) -> None:
     """The result as tables."""
-    table = Table(
-        title="largest stable step, ms: measured; predicted safe .. blow-up", show_lines=True
-    )
-    table.add_column("case")
-    for integrator in result.config.integrators:
-        table.add_column(integrator)
+    title = "largest stable step, ms: measured; predicted safe .. blow-up"
+    table = Table("case", *result.config.integrators, title=title, show_lines=True)
     rows = {(row.case, row.integrator): row for row in result.rows}
     for case in result.config.cases:
         table.add_row(case, *(cell(rows[case, name]) for name in result.config.integrators))
@@ -63,9 +58,7 @@ EXPERIMENT = Experiment(
     config=Config,
     run=run,
     show=show,
-    bar=lambda config, quiet: progress_bar(
-        "cases", len(config.cases) * len(config.integrators), quiet=quiet
-    ),
+    bar=counting("cases", lambda config: len(config.cases) * len(config.integrators)),
     write=write,
     figures=figures,
 )

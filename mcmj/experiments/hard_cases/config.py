@@ -4,8 +4,13 @@ from dataclasses import dataclass
 
 from mcmj.core.integrators import INTEGRATORS
 from mcmj.experiments.hard_cases.bodies import CASES
-from mcmj.utils.errors import UnknownNameError
-from mcmj.utils.validation import require_count, require_duration, require_number, require_seed
+from mcmj.utils.validation import (
+    require_count,
+    require_duration,
+    require_name,
+    require_number,
+    require_seed,
+)
 
 
 @dataclass(frozen=True)
@@ -35,10 +40,5 @@ class Config:
         require_number("precision", self.precision, 0.0, 1.0, open_low=True)
         if not self.cases:
             object.__setattr__(self, "cases", tuple(CASES))
-        for kind, names, known in (
-            ("hard case", self.cases, CASES),
-            ("integrator", self.integrators, INTEGRATORS),
-        ):
-            for name in names:
-                if name not in known:
-                    raise UnknownNameError(kind, name, known)
+        require_name("hard case", CASES, *self.cases)
+        require_name("integrator", INTEGRATORS, *self.integrators)

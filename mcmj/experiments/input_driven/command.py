@@ -3,15 +3,13 @@
 from pathlib import Path
 
 from rich.console import Console
-from rich.table import Table
 
-from mcmj.experiments.base import Experiment
+from mcmj.experiments.base import Experiment, counting, table_of
 from mcmj.experiments.input_driven.config import Config, total_steps
 from mcmj.experiments.input_driven.figure import figures
 from mcmj.experiments.input_driven.run import Result, run
 from mcmj.mjcf.write import to_mjcf
 from mcmj.utils import files
-from mcmj.utils.progress import progress_bar
 
 
 def write(result: Result, folder: Path) -> None:
@@ -40,9 +38,9 @@ def body_file(result: Result) -> str:
 def show(result: Result, console: Console) -> None:
     """The result as tables."""
     config, first = result.config, result.first
-    table = Table(title=f"last {config.window:g} s of {config.free_run:g} s at constant input")
-    for column in ("input", "orbit error", "amplitude error", "frequency error"):
-        table.add_column(column, justify="right")
+    title = f"last {config.window:g} s of {config.free_run:g} s at constant input"
+    columns = ("input", "orbit error", "amplitude error", "frequency error")
+    table = table_of(title, *columns, words=0)
     for u, held in first.held.items():
         errors = (held.orbit_error, held.amplitude_error, held.frequency_error)
         table.add_row(f"{u:g}", *(f"{100 * error:.2f} %" for error in errors))
@@ -65,7 +63,7 @@ EXPERIMENT = Experiment(
     config=Config,
     run=run,
     show=show,
-    bar=lambda config, quiet: progress_bar("teaching, running", total_steps(config), quiet=quiet),
+    bar=counting("teaching, running", total_steps),
     write=write,
     figures=figures,
 )

@@ -8,7 +8,7 @@ from rich.console import Console
 from rich.table import Table
 
 from mcmj.core.random_body import draw_body
-from mcmj.experiments.base import Experiment
+from mcmj.experiments.base import Experiment, counting, table_of
 from mcmj.experiments.limit_cycle.config import Config, total_steps
 from mcmj.experiments.limit_cycle.figure import figures
 from mcmj.experiments.limit_cycle.result import Result
@@ -18,7 +18,6 @@ from mcmj.metrics.success_rates import rate_cells
 from mcmj.mjcf.write import to_mjcf
 from mcmj.pictures.rendering import limit_cycle_video
 from mcmj.utils import files
-from mcmj.utils.progress import progress_bar
 
 
 def write(result: Result, out: Path) -> None:
@@ -77,9 +76,9 @@ def write_videos(result: Result, out: Path) -> None:
 def show(result: Result, console: Console) -> None:
     """The result as tables."""
     config = result.config
-    table = Table(title=f"last {config.window:g} s of {config.free_run:g} s in closed loop")
-    for column in ("task", "orbit error", "period error", "amplitude error", "training NRMSE"):
-        table.add_column(column, justify="left" if column == "task" else "right")
+    title = f"last {config.window:g} s of {config.free_run:g} s in closed loop"
+    columns = ("task", "orbit error", "period error", "amplitude error", "training NRMSE")
+    table = table_of(title, *columns)
     for name, task in result.tasks.items():
         errors = task.errors
         table.add_row(
@@ -102,9 +101,9 @@ def show(result: Result, console: Console) -> None:
 def show_seeds(result: Result, console: Console) -> None:
     """How many of the bodies learned it."""
     assert result.seeds is not None
-    table = Table(title=f"orbit error below {100 * result.config.threshold:g} %")
-    for column in ("task", "bodies", "95 % interval", "median orbit error", "median period error"):
-        table.add_column(column)
+    title = f"orbit error below {100 * result.config.threshold:g} %"
+    columns = ("task", "bodies", "95 % interval", "median orbit error", "median period error")
+    table = Table(*columns, title=title)
     rows: dict[str, Any] = result.seeds.metrics
     for name, row in rows.items():
         errors = [
@@ -121,9 +120,7 @@ EXPERIMENT = Experiment(
     config=Config,
     run=run,
     show=show,
-    bar=lambda config, quiet: progress_bar(
-        "teaching and running", total_steps(config), quiet=quiet
-    ),
+    bar=counting("teaching and running", total_steps),
     seed=lambda config: config.noise_seed,
     write=write,
     figures=figures,

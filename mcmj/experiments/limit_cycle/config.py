@@ -12,11 +12,12 @@ from mcmj.metrics import orbits
 from mcmj.mjcf.bundled import open_body
 from mcmj.targets.limit_cycles import TARGETS, Target
 from mcmj.targets.named import named_target, require_outputs
-from mcmj.utils.errors import InvalidArgumentError, UnknownNameError
+from mcmj.utils.errors import InvalidArgumentError
 from mcmj.utils.validation import (
     Array,
     require_count,
     require_duration,
+    require_name,
     require_number,
     require_timestep,
 )
@@ -74,8 +75,7 @@ class Config:
         require_number("window", self.window, 0.0, self.free_run, open_low=True)
         if self.windows != 0.0:
             require_number("windows", self.windows, orbits.PERIODS_NEEDED * longest)
-        if self.engine not in ENGINES:
-            raise UnknownNameError("engine", self.engine, ENGINES)
+        require_name("engine", ENGINES, self.engine)
         if self.body is not None and self.settings != BodySettings():
             changed = [
                 k for k, v in asdict(BodySettings()).items() if getattr(self.settings, k) != v

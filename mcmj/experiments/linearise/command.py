@@ -3,13 +3,11 @@
 from pathlib import Path
 
 from rich.console import Console
-from rich.table import Table
 
-from mcmj.experiments.base import Experiment
+from mcmj.experiments.base import Experiment, counting, table_of
 from mcmj.experiments.linearise.figure import figures
 from mcmj.experiments.linearise.run import Config, Result, run, total_arrays
 from mcmj.utils import files
-from mcmj.utils.progress import progress_bar
 
 
 def write(result: Result, folder: Path) -> None:
@@ -26,12 +24,10 @@ def show(result: Result, console: Console) -> None:
     """The reports, then the arrays as a table."""
     print(report(result))
     config = result.config
-    table = Table(title="arrays of linear springs, from diverse to equal")
-    table.add_column("diversity", justify="right")
-    for n in config.sizes:
-        table.add_column(f"rank of {2 * n}", justify="right")
-    for n in config.memory_sizes:
-        table.add_column(f"NRMSE, {n} springs", justify="right")
+    columns = [f"rank of {2 * n}" for n in config.sizes]
+    columns += [f"NRMSE, {n} springs" for n in config.memory_sizes]
+    title = "arrays of linear springs, from diverse to equal"
+    table = table_of(title, "diversity", *columns, words=0)
     for place, spread in enumerate(config.spreads):
         ranks = [str(result.ranks[n][place]) for n in config.sizes]
         errors = [f"{result.errors[n][place]:.3f}" for n in config.memory_sizes]
@@ -46,7 +42,7 @@ EXPERIMENT = Experiment(
     config=Config,
     run=run,
     show=show,
-    bar=lambda config, quiet: progress_bar("arrays", total_arrays(config), quiet=quiet),
+    bar=counting("arrays", total_arrays),
     write=write,
     figures=figures,
 )

@@ -3,15 +3,13 @@
 from pathlib import Path
 
 from rich.console import Console
-from rich.table import Table
 
-from mcmj.experiments.base import Experiment
+from mcmj.experiments.base import Experiment, counting, table_of
 from mcmj.experiments.perturb.config import Config, total_steps
 from mcmj.experiments.perturb.figure import figures
 from mcmj.experiments.perturb.result import Result
 from mcmj.experiments.perturb.run import run
 from mcmj.utils import files
-from mcmj.utils.progress import progress_bar
 
 
 def write(result: Result, folder: Path) -> None:
@@ -24,12 +22,9 @@ def write(result: Result, folder: Path) -> None:
 def show(result: Result, console: Console) -> None:
     """The result as tables."""
     config, first = result.config, result.bodies[0]
-    table = Table(title=f"disturbed for {config.window:g} s, then free for {config.after:g} s")
-    for column in ("perturbation", "orbit error", "recovery time"):
-        table.add_column(column, justify="left" if column == "perturbation" else "right")
-    if config.seeds > 1:
-        table.add_column("recovered")
-        table.add_column("median recovery time", justify="right")
+    columns = ("recovered", "median recovery time") if config.seeds > 1 else ()
+    title = f"disturbed for {config.window:g} s, then free for {config.after:g} s"
+    table = table_of(title, "perturbation", "orbit error", "recovery time", *columns)
     for name, r in first.recoveries.items():
         cells = [name, f"{100 * r.orbit_error:.2f} %", f"{r.recovery_time:.2f} s"]
         if config.seeds > 1:
@@ -49,9 +44,7 @@ EXPERIMENT = Experiment(
     config=Config,
     run=run,
     show=show,
-    bar=lambda config, quiet: progress_bar(
-        "teaching, disturbing", total_steps(config), quiet=quiet
-    ),
+    bar=counting("teaching, disturbing", total_steps),
     write=write,
     figures=figures,
 )

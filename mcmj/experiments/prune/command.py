@@ -4,15 +4,13 @@ from pathlib import Path
 
 import numpy as np
 from rich.console import Console
-from rich.table import Table
 
-from mcmj.experiments.base import Experiment
+from mcmj.experiments.base import Experiment, counting, table_of
 from mcmj.experiments.prune.config import Config, total_runs
 from mcmj.experiments.prune.figure import figures
 from mcmj.experiments.prune.result import Result
 from mcmj.experiments.prune.run import run
 from mcmj.utils import files
-from mcmj.utils.progress import progress_bar
 
 
 def write(result: Result, folder: Path) -> None:
@@ -26,11 +24,9 @@ def write(result: Result, folder: Path) -> None:
 def show(result: Result, console: Console) -> None:
     """The result as tables."""
     config = result.config
-    table = Table(title=f"orbit error below {100 * config.threshold:g} %, {config.seeds} bodies")
-    table.add_column("springs sensed", justify="right")
-    for method in config.methods:
-        table.add_column(f"{method}: bodies", justify="right")
-        table.add_column("median error", justify="right")
+    title = f"orbit error below {100 * config.threshold:g} %, {config.seeds} bodies"
+    columns = [name for m in config.methods for name in (f"{m}: bodies", "median error")]
+    table = table_of(title, "springs sensed", *columns, words=0)
     for k, count in enumerate(config.counts):
         cells = [str(count)]
         for method in config.methods:
@@ -51,7 +47,7 @@ EXPERIMENT = Experiment(
     config=Config,
     run=run,
     show=show,
-    bar=lambda config, quiet: progress_bar("free runs", total_runs(config), quiet=quiet),
+    bar=counting("free runs", total_runs),
     seed=lambda config: config.of_seed(0).noise_seed,
     write=write,
     figures=figures,

@@ -7,8 +7,8 @@ from mcmj.experiments.limit_cycle import run as limit_cycle
 from mcmj.learning.lessons import Teaching
 from mcmj.learning.spring_selection import METHODS
 from mcmj.targets.named import named_target
-from mcmj.utils.errors import InvalidArgumentError, UnknownNameError
-from mcmj.utils.validation import require_count, require_number
+from mcmj.utils.errors import InvalidArgumentError
+from mcmj.utils.validation import require_count, require_name, require_number
 
 
 @dataclass(frozen=True)
@@ -52,9 +52,7 @@ class Config:
         named_target(self.task)
         for name in ("seeds", "starts"):
             require_count(name, getattr(self, name), 1)
-        for method in self.methods:
-            if method not in METHODS:
-                raise UnknownNameError("pruning method", method, METHODS)
+        require_name("pruning method", METHODS, *self.methods)
         for count in self.counts:
             require_count("counts", count, 1)
         if not self.methods or not self.counts:

@@ -7,13 +7,12 @@ from pathlib import Path
 
 from rich.console import Console
 
-from mcmj.experiments.base import Experiment
-from mcmj.experiments.render.config import Config
+from mcmj.experiments.base import Experiment, counting
+from mcmj.experiments.render.config import Config, total_milliseconds
 from mcmj.experiments.render.run import run
-from mcmj.learning.lessons import Teaching
 from mcmj.pictures.film import Film
 from mcmj.pictures.rendering import Report, write_film
-from mcmj.utils.progress import OnSteps, progress_bar
+from mcmj.utils.progress import OnSteps
 
 NAME = "film"
 
@@ -37,11 +36,6 @@ class Rendered:
             "pace": self.config.style.pace,
             "duration": float(self.film.times[-1] - self.film.times[0]),
         }
-
-
-def longest_run(config: Config) -> float:
-    """Of the body, teaching included, in simulated seconds."""
-    return config.before + config.during + config.after + Teaching().total
 
 
 def render(config: Config, folder: Path, on_steps: OnSteps) -> Rendered:
@@ -73,8 +67,6 @@ EXPERIMENT = Experiment(
     config=Config,
     run=render,
     show=show,
-    bar=lambda config, quiet: progress_bar(
-        "running and drawing", round(1e3 * (longest_run(config) + config.duration)), quiet=quiet
-    ),
+    bar=counting("running and drawing", total_milliseconds),
     needs_folder=True,
 )

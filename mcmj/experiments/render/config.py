@@ -3,10 +3,10 @@
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from mcmj.learning.lessons import Teaching
 from mcmj.pictures.rendering import Style
 from mcmj.targets.named import named_target
-from mcmj.utils.errors import UnknownNameError
-from mcmj.utils.validation import require_count, require_duration, require_number
+from mcmj.utils.validation import require_count, require_duration, require_name, require_number
 
 FORMATS = ("mp4", "gif", "png")
 
@@ -68,9 +68,7 @@ class Config:
         for output in self.freeze:
             require_count("freeze", output, 1)
         require_count("stills", self.stills, 1)
-        for kind in self.formats:
-            if kind not in FORMATS:
-                raise UnknownNameError("format", kind, FORMATS)
+        require_name("format", FORMATS, *self.formats)
         if self.task is not None:
             named_target(self.task)
 
@@ -82,3 +80,9 @@ class Config:
         words += [f"length noise {self.length_noise:g} m"] * (self.length_noise > 0)
         words += [f"kicked at {self.kick:g} m/s"] * (self.kick > 0)
         return ", ".join(words)
+
+
+def total_milliseconds(config: Config) -> int:
+    """Run at most, teaching included, and drawn: for a progress bar."""
+    run = config.before + config.during + config.after + Teaching().total
+    return round(1e3 * (run + config.duration))

@@ -6,12 +6,11 @@ from pathlib import Path
 from rich.console import Console
 from rich.table import Table
 
-from mcmj.experiments.base import Experiment
+from mcmj.experiments.base import Experiment, counting
 from mcmj.experiments.reproduce.page import KINDS, page
 from mcmj.experiments.reproduce.run import Config, Result, run, total_runs
 from mcmj.utils import files
 from mcmj.utils.errors import McmjError
-from mcmj.utils.progress import progress_bar
 
 TITLE = "The role of feedback in morphological computation, reproduced"
 
@@ -57,7 +56,7 @@ EXPERIMENT = Experiment(
     config=Config,
     run=run,
     show=show,
-    bar=lambda config, quiet: progress_bar("commands", total_runs(config), quiet=quiet),
+    bar=counting("commands", total_runs),
     seed=lambda config: 0,
     write=write,
     verdict=verdict,

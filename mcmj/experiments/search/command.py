@@ -42,9 +42,8 @@ def show(result: Result, console: Console) -> None:
     """The result as tables."""
     config, metrics, console = result.config, result.metrics, Console()
     side = "above" if config.maximise else "below"
-    table = Table(title=f"{config.experiment}: {config.target.path} {side} {config.threshold:g}")
-    for column in ("", "", "trials", "95 % interval"):
-        table.add_column(column)
+    heading = f"{config.experiment}: {config.target.path} {side} {config.threshold:g}"
+    table = Table("", "", "trials", "95 % interval", title=heading)
     parts = {path: config.target.label(path) for path in result.parts}
     rows = [("score", parts.get(path, path), row) for path, row in result.success.items()]
     for path, values in result.by_setting.items():

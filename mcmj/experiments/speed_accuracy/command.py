@@ -5,15 +5,13 @@ import io
 from pathlib import Path
 
 from rich.console import Console
-from rich.table import Table
 
-from mcmj.experiments.base import Experiment
+from mcmj.experiments.base import Experiment, counting, table_of
 from mcmj.experiments.speed_accuracy.config import Config
 from mcmj.experiments.speed_accuracy.figure import figures
 from mcmj.experiments.speed_accuracy.result import Result
 from mcmj.experiments.speed_accuracy.run import BASE, run
 from mcmj.utils import files
-from mcmj.utils.progress import progress_bar
 
 
 def write(result: Result, folder: Path) -> None:
@@ -40,11 +38,8 @@ def show(result: Result, console: Console) -> None:
     """The result as tables."""
     console = Console(width=40 + 16 * len(result.cells))
     step = 1.0 if 1.0 in result.config.steps_ms else result.config.steps_ms[0]
-    table = Table(title=f"error at {step:g} ms (cost over {BASE})")
-    table.add_column("method")
-    table.add_column("order")
-    for body in result.cells:
-        table.add_column(body, justify="right")
+    title = f"error at {step:g} ms (cost over {BASE})"
+    table = table_of(title, "method", "order", *result.cells, words=2)
     for method in result.config.methods:
         order = result.orders[method]
         cells = [methods[method][step] for methods in result.cells.values()]
@@ -65,7 +60,7 @@ EXPERIMENT = Experiment(
     config=Config,
     run=run,
     show=show,
-    bar=lambda config, quiet: progress_bar("bodies", len(config.bodies), quiet=quiet),
+    bar=counting("bodies", lambda config: len(config.bodies)),
     write=write,
     figures=figures,
 )

@@ -6,11 +6,12 @@ from dataclasses import dataclass
 from mcmj.core.body import Body
 from mcmj.core.random_body import random_body
 from mcmj.experiments.speed_accuracy.methods import METHODS
-from mcmj.utils.errors import InvalidArgumentError, UnknownNameError
+from mcmj.utils.errors import InvalidArgumentError
 from mcmj.utils.validation import (
     SHORTEST_STEP,
     require_count,
     require_duration,
+    require_name,
     require_number,
     require_seed,
 )
@@ -57,13 +58,8 @@ class Config:
     attractor: bool = True
 
     def __post_init__(self) -> None:
-        for kind, names, valid in (
-            ("body", self.bodies, tuple(BODIES)),
-            ("method", self.methods, METHODS),
-        ):
-            for name in names:
-                if name not in valid:
-                    raise UnknownNameError(kind, name, valid)
+        require_name("body", BODIES, *self.bodies)
+        require_name("method", METHODS, *self.methods)
         require_seed("seed", self.seed)
         require_number("speed", self.speed, 0.0)
         require_number("force", self.force, 0.0)

@@ -3,15 +3,13 @@
 from pathlib import Path
 
 from rich.console import Console
-from rich.table import Table
 
-from mcmj.experiments.base import Experiment
+from mcmj.experiments.base import Experiment, counting, table_of
 from mcmj.experiments.swing_up.config import Config, total_steps
 from mcmj.experiments.swing_up.figure import figures
 from mcmj.experiments.swing_up.result import Result
 from mcmj.experiments.swing_up.run import run
 from mcmj.utils import files
-from mcmj.utils.progress import progress_bar
 
 
 def write(result: Result, folder: Path) -> None:
@@ -24,9 +22,9 @@ def write(result: Result, folder: Path) -> None:
 def show(result: Result, console: Console) -> None:
     """The result as tables."""
     config = result.config
-    table = Table(title=f"{config.free_run:g} s from total rest")
-    for column in ("task", "orbit error", "swing-up time", "rounds of practice", "kicked starts"):
-        table.add_column(column, justify="left" if column == "task" else "right")
+    title = f"{config.free_run:g} s from total rest"
+    columns = ("task", "orbit error", "swing-up time", "rounds of practice", "kicked starts")
+    table = table_of(title, *columns)
     for name, task in result.bodies[0].items():
         kicked = task.kicked_fraction
         table.add_row(
@@ -47,9 +45,7 @@ EXPERIMENT = Experiment(
     config=Config,
     run=run,
     show=show,
-    bar=lambda config, quiet: progress_bar(
-        "teaching, swinging up", total_steps(config), quiet=quiet
-    ),
+    bar=counting("teaching, swinging up", total_steps),
     seed=lambda config: config.of_seed(0).noise_seed,
     write=write,
     figures=figures,

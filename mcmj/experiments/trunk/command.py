@@ -4,16 +4,14 @@ from pathlib import Path
 from typing import Any
 
 from rich.console import Console
-from rich.table import Table
 
-from mcmj.experiments.base import Experiment
+from mcmj.experiments.base import Experiment, counting, table_of
 from mcmj.experiments.trunk.config import Config, total_seconds
 from mcmj.experiments.trunk.figure import figures
 from mcmj.experiments.trunk.result import Result
 from mcmj.experiments.trunk.run import run
 from mcmj.robots.trunk_walker import TIMESTEP
 from mcmj.utils import files
-from mcmj.utils.progress import progress_bar
 
 SHOWN = 5.0  # seconds of each gait in the film
 
@@ -43,9 +41,9 @@ def film(result: Result, out: Path) -> None:
 def show(result: Result, console: Console) -> None:
     """The result as tables."""
     table: Any = files.plain(result.metrics)
-    rows = Table(title=f"{result.config.walking:g} s of walking, springs drive the muscles")
-    for name in ("gait", "speed", "cost of transport", "orbit error", "by regression", "falls"):
-        rows.add_column(name, justify="left" if name == "gait" else "right")
+    title = f"{result.config.walking:g} s of walking, springs drive the muscles"
+    columns = ("speed", "cost of transport", "orbit error", "by regression", "falls")
+    rows = table_of(title, "gait", *columns)
     for name in result.config.gaits:
         row = table[name]
         walked = ["-"] * 3 if row["falls"] else [
@@ -74,9 +72,7 @@ EXPERIMENT = Experiment(
     config=Config,
     run=run,
     show=show,
-    bar=lambda config, quiet: progress_bar(
-        "walking", round(total_seconds(config) / TIMESTEP), quiet=quiet
-    ),
+    bar=counting("walking", lambda config: round(total_seconds(config) / TIMESTEP)),
     write=write,
     figures=figures,
     film=film,

@@ -4,14 +4,12 @@ from pathlib import Path
 from typing import Any
 
 from rich.console import Console
-from rich.table import Table
 
-from mcmj.experiments.base import Experiment
+from mcmj.experiments.base import Experiment, counting, table_of
 from mcmj.experiments.walk.config import Config, total_steps
 from mcmj.experiments.walk.figure import figures
 from mcmj.experiments.walk.run import Result, run, tour
 from mcmj.utils import files
-from mcmj.utils.progress import progress_bar
 
 
 def film(result: Result, out: Path) -> None:
@@ -26,10 +24,9 @@ def show(result: Result, console: Console) -> None:
     """The result as tables."""
     table: Any = files.plain(result.metrics)
     if result.walks:
-        rows = Table(title=f"{result.config.walking:g} s of walking")
-        names = ("gait", "distance", "speed", "cost of transport", "stride period", "falls")
-        for name in names:
-            rows.add_column(name, justify="left" if name == "gait" else "right")
+        title = f"{result.config.walking:g} s of walking"
+        columns = ("distance", "speed", "cost of transport", "stride period", "falls")
+        rows = table_of(title, "gait", *columns)
         for name in result.walks:
             row = table[name]
             walked = ["-"] * 3 if row["falls"] else [
@@ -57,7 +54,7 @@ EXPERIMENT = Experiment(
     config=Config,
     run=run,
     show=show,
-    bar=lambda config, quiet: progress_bar("walking", total_steps(config), quiet=quiet),
+    bar=counting("walking", total_steps),
     figures=figures,
     film=film,
 )
