@@ -64,12 +64,12 @@ class StoredBody:
     settings: dict[str, Any]
 
     def take(self, *names: str, **given: object) -> dict[str, Any]:
-        """Arguments of a Simulation: those named as in the file, and those given.
+        """Arguments of a Simulation: those named as in the file, if it says, and those given.
 
         Warns of what the file holds and the run does not take; a spring law of the file's that
         mcmj does not know is one.
         """
-        run = {name: self.settings[name] for name in names} | given
+        run = {name: self.settings[name] for name in names if name in self.settings} | given
         if run.get("springs", NATIVE) not in (NATIVE, *SPRING_LAWS):
             run["springs"] = NATIVE
         defaults = {"timestep": 1e-3, "integrator": DEFAULT_INTEGRATOR, "springs": NATIVE,

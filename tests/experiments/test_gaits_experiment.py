@@ -113,7 +113,7 @@ def test_a_body_that_blows_up_does_not_walk(monkeypatch):
         ({"gaits": ("walk", "walk")}, "gaits: expected at least one, each once"),
         ({"seeds": 0}, "seeds: expected an integer >= 1"),
         ({"after": 5.0}, "after: expected a number in"),
-        ({"body": "gaits", "seeds": 2}, "body: expected no settings or seeds beside it"),
+        ({"body": "gaits", "seeds": 2}, "seeds: expected 1 beside a body"),
     ],
 )
 def test_wrong_configurations_are_refused(wrong, text):

@@ -238,7 +238,7 @@ def test_inputs_outside_the_taught_range_warn():
         ({"window": 90.0}, "window: expected a number in"),
         ({"readout": "mine"}, "readout: expected a body file that holds it"),
         ({"body": "b.xml", "readout": "mine", "teach": True}, "readout: expected none of the file"),
-        ({"body": "general", "seeds": 2}, "body: expected no settings or seeds beside it"),
+        ({"body": "general", "seeds": 2}, "seeds: expected 1 beside a body"),
         ({"every": 0}, "every: expected an integer in"),
         ({"noise": -1.0}, "noise: expected a number"),
     ],

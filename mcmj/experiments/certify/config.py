@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, field
 
-from mcmj.experiments.limit_cycle import run as limit_cycle
+from mcmj.experiments.limit_cycle import config as limit_cycle
 from mcmj.learning.lessons import Teaching
 from mcmj.metrics import orbits
 from mcmj.targets.named import named_target

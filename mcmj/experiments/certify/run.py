@@ -16,7 +16,7 @@ from mcmj.analysis.stability.phase import phase_diffusion
 from mcmj.analysis.stability.tolerance import Trial, force_tolerance, noise_tolerance
 from mcmj.experiments.certify.config import Config
 from mcmj.experiments.certify.result import Result
-from mcmj.experiments.limit_cycle import run as limit_cycle
+from mcmj.experiments.limit_cycle import config as limit_cycle
 from mcmj.learning.teaching import synchronise, teach
 from mcmj.metrics import orbits
 from mcmj.reference.twin.population import rest as rest_state

@@ -32,7 +32,7 @@ def write(result: Result, out: Path) -> None:
         arrays[f"{name}/from_rest"] = gait.from_rest.outputs
     for (start, end), switch in first.switches.items():
         arrays[f"{start}_to_{end}/outputs"] = switch.outputs
-    files.write_arrays(out / "trajectory.npz", arrays, config, config.first_seed)
+    files.write_arrays(out / "trajectory.npz", arrays, config, config.source.first_seed)
 
 
 def show(result: Result, console: Console) -> None:
@@ -77,7 +77,7 @@ EXPERIMENT = Experiment(
     run=run,
     show=show,
     bar=counting("teaching, switching", total_steps),
-    seed=lambda config: config.first_seed,
+    seed=lambda config: config.source.first_seed,
     write=write,
     figures=figures,
 )

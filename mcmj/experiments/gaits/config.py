@@ -1,14 +1,14 @@
 """What the gaits experiment runs: its Config, and the body and readouts it asks for."""
 
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from itertools import permutations
 
 from mcmj.core.body import Body
-from mcmj.core.random_body import BodySettings, draw_body
+from mcmj.core.random_body import BodySettings
+from mcmj.experiments.body_source import BodySource
 from mcmj.learning.lessons import Teaching
 from mcmj.learning.practice import Practice
 from mcmj.metrics import orbits
-from mcmj.mjcf.bundled import open_body
 from mcmj.targets.gaits import GAITS, LEGS, gait_target
 from mcmj.utils.errors import InvalidArgumentError
 from mcmj.utils.validation import (
@@ -17,7 +17,6 @@ from mcmj.utils.validation import (
     require_duration,
     require_names,
     require_number,
-    require_seed,
     require_timestep,
 )
 
@@ -75,9 +74,7 @@ class Config:
 
     def __post_init__(self) -> None:
         require_names("gait", self.gaits, GAITS)
-        if self.seed is not None:
-            require_seed("seed", self.seed)
-        require_count("seeds", self.seeds, 1)
+        self.source  # noqa: B018  checks body, seeds and settings
         require_count("phases", self.phases, 1)
         for name in ("tolerance", "window"):
             require_number(name, getattr(self, name), 0.0, open_low=True)
@@ -86,13 +83,11 @@ class Config:
             require_duration(name, getattr(self, name), self.timestep)
         for name in ("free_run", "after", "from_rest"):
             require_number(name, getattr(self, name), self.window)
-        if self.body is not None and (self.settings != DRAWN or self.seeds > 1):
-            raise InvalidArgumentError("body", "no settings or seeds beside it", self.body)
 
     @property
-    def first_seed(self) -> int:
-        """The seed, or its default."""
-        return 0 if self.seed is None else self.seed
+    def source(self) -> BodySource:
+        """Of the bodies."""
+        return BodySource(self.body, self.seed, self.seeds, self.settings, DRAWN, "gaits")
 
     @property
     def pairs(self) -> tuple[tuple[str, str], ...]:
@@ -102,16 +97,11 @@ class Config:
 
 def get_body(config: Config, seed: int) -> tuple[Body, dict[str, Array], dict[str, object]]:
     """The body of a seed, or the config's; the readouts that came with it; its provenance."""
-    drawn = config.seed is not None or config.seeds > 1 or config.settings != DRAWN
-    if config.body is None and drawn:
-        source: dict[str, object] = {"seed": seed, "settings": asdict(config.settings)}
-        body, readouts = draw_body(seed, config.settings), {}
-    else:
-        stored = open_body("gaits" if config.body is None else config.body)
-        stored.take(timestep=config.timestep)
-        body, source, held = stored.body, stored.provenance, stored.readouts
-        readouts = {name: held[name] for name in config.gaits if name in held}
-    return body, readouts, source
+    stored = config.source.get(seed)
+    stored.take(timestep=config.timestep)
+    held = stored.readouts
+    readouts = {name: held[name] for name in config.gaits if name in held}
+    return stored.body, readouts, stored.provenance
 
 
 def check(config: Config, body: Body) -> None:

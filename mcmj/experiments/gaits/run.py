@@ -33,7 +33,7 @@ def run(config: Config, *, on_steps: OnSteps = lambda steps: None) -> Result:
         BodyFileError, InvalidArgumentError: a body that cannot do it.
     """
     first, outcomes = None, []
-    for seed in range(config.first_seed, config.first_seed + config.seeds):
+    for seed in config.source.all_seeds:
         body, readouts, source = get_body(config, seed)
         result = run_body(config, body, readouts, seed, source=source, on_steps=on_steps)
         outcomes.append(outcome(result, seed, config.tolerance))

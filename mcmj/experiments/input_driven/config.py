@@ -1,13 +1,13 @@
 """What the input-driven experiment runs: its Config, and the body and readout it asks for."""
 
 import warnings
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 
 from mcmj.core.body import Body
-from mcmj.core.random_body import BodySettings, draw_body
+from mcmj.core.random_body import BodySettings
+from mcmj.experiments.body_source import BodySource
 from mcmj.learning.lessons import Teaching
 from mcmj.learning.practice import Practice
-from mcmj.mjcf.bundled import open_body
 from mcmj.targets.input_profiles import Profile, Ramp, hold
 from mcmj.targets.input_systems import QUADRATIC
 from mcmj.utils.errors import InvalidArgumentError, McmjWarning, UnknownNameError
@@ -16,7 +16,6 @@ from mcmj.utils.validation import (
     require_count,
     require_duration,
     require_number,
-    require_seed,
     require_timestep,
 )
 
@@ -88,8 +87,7 @@ class Config:
     practice: Practice = PRACTICE
 
     def __post_init__(self) -> None:
-        require_seed("seed", self.seed)
-        require_count("seeds", self.seeds, 1)
+        self.source  # noqa: B018  checks body, seeds and settings
         require_count("phases", self.phases, 1)
         require_number("tolerance", self.tolerance, 0.0, open_low=True)
         require_timestep("timestep", self.timestep)
@@ -102,8 +100,6 @@ class Config:
         for name in ("inputs", "curve"):
             for value in getattr(self, name):
                 require_number(name, value, 0.0, open_low=True)
-        if self.body is not None and (self.settings != DRAWN or self.seeds > 1):
-            raise InvalidArgumentError("body", "no settings or seeds beside it", self.body)
         if self.readout is not None and self.body is None:
             raise InvalidArgumentError("readout", "a body file that holds it", self.readout)
         if self.readout is not None and self.teach:
@@ -111,6 +107,11 @@ class Config:
                 "readout", "none of the file's where one is taught", self.readout
             )
         self.teaching  # noqa: B018  checks the rest
+
+    @property
+    def source(self) -> BodySource:
+        """Of the bodies."""
+        return BodySource(self.body, self.seed, self.seeds, self.settings, DRAWN)
 
     @property
     def readout_name(self) -> str:
@@ -172,12 +173,7 @@ def get_start(config: Config, seed: int) -> Start:
     """
     course = config.course
     taught = (course.low, course.high)
-    if config.body is None:
-        body = draw_body(seed, config.settings)
-        check_channels(body)
-        source = {"seed": seed, "settings": asdict(config.settings)}
-        return Start(body, None, taught, {}, source, {})
-    stored = open_body(config.body)
+    stored = config.source.get(seed)
     stored.take(timestep=config.timestep)
     body, readouts, account = stored.body, stored.readouts, stored.provenance
     check_channels(body)

@@ -1,21 +1,21 @@
 """What the limit-cycle experiment runs: its Config, and the body and readouts it asks for."""
 
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field, fields, replace
+from typing import Any
 
 from mcmj.core.body import Body
 from mcmj.core.integrators import DEFAULT_INTEGRATOR
 from mcmj.core.options import ENGINES
-from mcmj.core.random_body import BodySettings, draw_body
+from mcmj.core.random_body import BodySettings
+from mcmj.experiments.body_source import BodySource
 from mcmj.learning.free_run import WINDOW
 from mcmj.learning.lessons import Teaching
 from mcmj.metrics import orbits
-from mcmj.mjcf.bundled import open_body
 from mcmj.targets.limit_cycles import TARGETS, Target
 from mcmj.targets.named import named_target, require_outputs
 from mcmj.utils.errors import InvalidArgumentError
 from mcmj.utils.validation import (
     Array,
-    require_count,
     require_duration,
     require_name,
     require_number,
@@ -68,7 +68,7 @@ class Config:
 
     def __post_init__(self) -> None:
         longest = max(wanted.period for wanted in self.targets.values())
-        require_count("seeds", self.seeds, 1)
+        self.source  # noqa: B018  checks body, seeds and settings
         require_number("threshold", self.threshold, 0.0, open_low=True)
         require_timestep("timestep", self.timestep)
         require_duration("free_run", self.free_run, self.timestep)
@@ -76,16 +76,6 @@ class Config:
         if self.windows != 0.0:
             require_number("windows", self.windows, orbits.PERIODS_NEEDED * longest)
         require_name("engine", ENGINES, self.engine)
-        if self.body is not None and self.settings != BodySettings():
-            changed = [
-                k for k, v in asdict(BodySettings()).items() if getattr(self.settings, k) != v
-            ]
-            raise InvalidArgumentError(
-                ", ".join(changed), "no settings beside a body, which has its own", self.body
-            )
-
-        if self.seeds > 1 and self.body is not None:
-            raise InvalidArgumentError("body", "none beside seeds, which draw theirs", self.body)
 
     @property
     def targets(self) -> dict[str, Target]:
@@ -96,21 +86,34 @@ class Config:
     @property
     def noise_seed(self) -> int:
         """The seed, or its default."""
-        return 0 if self.seed is None else self.seed
+        return self.source.first_seed
+
+    @property
+    def source(self) -> BodySource:
+        """Of the bodies."""
+        usual = BodySettings()
+        return BodySource(self.body, self.seed, self.seeds, self.settings, usual, "general")
 
 
 def get_body(config: Config) -> Found:
     """The config's body, the readouts that came with it, and where it comes from."""
-    drawn = config.seed is not None or config.seeds > 1 or config.settings != BodySettings()
-    if config.body is None and drawn:
-        body = draw_body(config.noise_seed, config.settings)
-        return body, {}, {"seed": config.noise_seed, "settings": asdict(config.settings)}
-    stored = open_body("general" if config.body is None else config.body)
+    stored = config.source.get(config.noise_seed)
     stored.take(timestep=config.timestep, integrator=config.integrator)
     readouts = stored.readouts
     if not readouts and stored.w_out is not None and config.task != "all":
         readouts = dict.fromkeys(config.targets, stored.w_out)
     return stored.body, readouts, stored.provenance
+
+
+def of_seed(config: Any, index: int) -> Config:
+    """The limit-cycle experiment of the body number `index`.
+
+    Args:
+        config: of an experiment with some of the same fields, `seeds` among them.
+    """
+    names = {field.name for field in fields(Config)} & {field.name for field in fields(config)}
+    one = Config(**{name: getattr(config, name) for name in names})
+    return replace(one, seed=one.source.all_seeds[index] if one.seeds > 1 else one.seed, seeds=1)
 
 
 def total_steps(config: Config) -> int:

@@ -3,16 +3,14 @@
 from dataclasses import dataclass, field, replace
 
 from mcmj.core.random_body import BodySettings
+from mcmj.experiments.body_source import BodySource
 from mcmj.learning.teaching import Teaching
 from mcmj.metrics import orbits
 from mcmj.simulation.run_phases import Phase, RandomForces
 from mcmj.targets.named import named_target
-from mcmj.utils.errors import InvalidArgumentError
 from mcmj.utils.validation import (
-    require_count,
     require_duration,
     require_number,
-    require_seed,
     require_timestep,
 )
 
@@ -69,8 +67,7 @@ class Config:
 
     def __post_init__(self) -> None:
         period = named_target(self.task).period
-        require_seed("seed", self.seed)
-        require_count("seeds", self.seeds, 1)
+        self.source  # noqa: B018  checks body, seeds and settings
         require_timestep("timestep", self.timestep)
         for name in ("before", "window", "after"):
             require_duration(name, getattr(self, name), self.timestep)
@@ -79,10 +76,13 @@ class Config:
         require_number("error_window", self.error_window, 0.0, self.after, open_low=True)
         for std in self.noise_curve:
             require_number("noise_curve", std, 0.0, open_low=True)
-        if self.body is not None and (self.settings != DRAWN or self.seeds > 1):
-            raise InvalidArgumentError("body", "no settings or seeds beside it", self.body)
         require_number("after", self.after, 2 * period)
         require_number("error_window", self.error_window, orbits.PERIODS_NEEDED * period)
+
+    @property
+    def source(self) -> BodySource:
+        """Of the bodies."""
+        return BodySource(self.body, self.seed, self.seeds, self.settings, DRAWN)
 
     @property
     def perturbations(self) -> dict[str, Phase]:

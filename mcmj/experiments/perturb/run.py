@@ -1,17 +1,14 @@
 """Fig. 6: a taught rhythm is disturbed for a while, and comes back."""
 
-from dataclasses import asdict
 from typing import Any
 
 import numpy as np
 
 from mcmj.core.body import Body
-from mcmj.core.random_body import draw_body
 from mcmj.experiments.perturb.config import Config
 from mcmj.experiments.perturb.result import LOST, BodyResult, Recovery, Result
 from mcmj.learning.teaching import teach
 from mcmj.metrics import orbits
-from mcmj.mjcf.bundled import open_body
 from mcmj.simulation.run_phases import Phase, Schedule, run_schedule
 from mcmj.simulation.simulation import Simulation
 from mcmj.targets.limit_cycles import Target
@@ -30,21 +27,15 @@ def run(config: Config, *, on_steps: OnSteps = lambda steps: None) -> Result:
         InvalidArgumentError: a body without as many outputs as the task has.
     """
     wanted = named_target(config.task)
-    bodies = [
-        _of_body(config, config.seed + index, wanted, on_steps) for index in range(config.seeds)
-    ]
-    return Result(config, wanted, bodies)
+    seeds = config.source.all_seeds
+    return Result(config, wanted, [_of_body(config, seed, wanted, on_steps) for seed in seeds])
 
 
 def get_body(config: Config, seed: int) -> tuple[Body, dict[str, object], dict[str, Any]]:
     """The body of a seed, or the config's; where it comes from; arguments of its Simulation."""
-    given: dict[str, Any] = {"timestep": config.timestep}
-    if config.body is None:
-        source = {"seed": seed, "settings": asdict(config.settings)}
-        return draw_body(seed, config.settings), source, given
-    stored = open_body(config.body)
+    stored = config.source.get(seed)
     names = ("integrator", "springs") if config.engine == "mujoco" else ()
-    return stored.body, stored.provenance, stored.take(*names, **given)
+    return stored.body, stored.provenance, stored.take(*names, timestep=config.timestep)
 
 
 def _of_body(config: Config, seed: int, wanted: Target, on_steps: OnSteps) -> BodyResult:

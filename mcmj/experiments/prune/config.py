@@ -1,9 +1,9 @@
 """What the pruning experiment runs: its Config."""
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 from mcmj.core.random_body import BodySettings
-from mcmj.experiments.limit_cycle import run as limit_cycle
+from mcmj.experiments.limit_cycle import config as limit_cycle
 from mcmj.learning.lessons import Teaching
 from mcmj.learning.spring_selection import METHODS
 from mcmj.targets.named import named_target
@@ -50,8 +50,7 @@ class Config:
 
     def __post_init__(self) -> None:
         named_target(self.task)
-        for name in ("seeds", "starts"):
-            require_count(name, getattr(self, name), 1)
+        require_count("starts", self.starts, 1)
         require_name("pruning method", METHODS, *self.methods)
         for count in self.counts:
             require_count("counts", count, 1)
@@ -62,12 +61,7 @@ class Config:
 
     def of_seed(self, index: int) -> limit_cycle.Config:
         """The limit-cycle experiment of the body number `index`."""
-        one = limit_cycle.Config(
-            task=self.task, body=self.body, seed=self.seed, free_run=self.free_run,
-            window=self.window, timestep=self.timestep, engine=self.engine,
-            settings=self.settings, teaching=self.teaching,
-        )  # fmt: skip
-        return one if self.seeds == 1 else replace(one, seed=one.noise_seed + index)
+        return limit_cycle.of_seed(self, index)
 
 
 def total_runs(config: Config) -> int:

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from mcmj.experiments.limit_cycle import run as limit_cycle
+from mcmj.experiments.limit_cycle import config as limit_cycle
 from mcmj.experiments.prune.config import Config
 from mcmj.experiments.prune.result import Pruned, Result
 from mcmj.learning.held_out import closed_loop_errors, held_out_starts

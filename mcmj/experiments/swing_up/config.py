@@ -1,12 +1,11 @@
 """What the swing-up experiment runs: its Config."""
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 from mcmj.core.random_body import BodySettings
-from mcmj.experiments.limit_cycle import run as limit_cycle
+from mcmj.experiments.limit_cycle import config as limit_cycle
 from mcmj.learning.lessons import Teaching
 from mcmj.learning.practice import Practice
-from mcmj.utils.errors import InvalidArgumentError
 from mcmj.utils.validation import require_count, require_number
 
 TAUGHT = Teaching(duration=240.0, rest_runs=2, rest_duration=30.0, rest_weight=1e-2)
@@ -54,27 +53,14 @@ class Config:
     practice: Practice = field(default_factory=Practice)
 
     def __post_init__(self) -> None:
-        require_count("seeds", self.seeds, 1)
         require_count("kicks", self.kicks, 0)
         require_number("kick_speed", self.kick_speed, 0.0)
         require_number("tolerance", self.tolerance, 0.0, open_low=True)
-        if self.body is not None and self.seeds > 1:
-            raise InvalidArgumentError("seeds", "1 beside a body", self.seeds)
         self.of_seed(0)  # checks the rest
 
     def of_seed(self, index: int) -> limit_cycle.Config:
         """The limit-cycle experiment of the body number `index`."""
-        one = limit_cycle.Config(
-            task=self.task,
-            body=self.body,
-            seed=self.seed,
-            free_run=self.free_run,
-            window=self.window,
-            timestep=self.timestep,
-            settings=self.settings,
-            teaching=self.teaching,
-        )
-        return one if self.seeds == 1 else replace(one, seed=one.noise_seed + index)
+        return limit_cycle.of_seed(self, index)
 
 
 def total_steps(config: Config) -> int:

@@ -3,7 +3,7 @@
 import numpy as np
 
 from mcmj.core.body import Body
-from mcmj.experiments.limit_cycle import run as limit_cycle
+from mcmj.experiments.limit_cycle import config as limit_cycle
 from mcmj.experiments.swing_up.config import Config
 from mcmj.experiments.swing_up.result import Result, SwingUp
 from mcmj.learning.practice import practise
