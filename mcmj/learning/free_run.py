@@ -40,6 +40,7 @@ def free_run(
     simulation: Simulation,
     steps: int,
     *,
+    inputs: Array | None = None,
     done: Array | None = None,
     checkpoint: Checkpoint | None = None,
     fit: Fit | None = None,
@@ -48,6 +49,7 @@ def free_run(
     """Run free and keep only the outputs (steps, n_outputs); a checkpoint after every chunk.
 
     Args:
+        inputs: (steps, n_inputs), default: none.
         done: outputs of the steps that are done already; the chunks are the same either way.
         fit: kept in the checkpoint.
 
@@ -64,7 +66,9 @@ def free_run(
         outputs[:at] = done
     if at == steps:
         return outputs
-    for part in simulation.stream(steps - at, record=("outputs",)):
+    for part in simulation.stream(
+        steps - at, None if inputs is None else inputs[at:], record=("outputs",)
+    ):
         new = part.get("outputs")
         outputs[at : at + len(new)] = new
         if checkpoint is not None:

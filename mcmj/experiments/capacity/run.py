@@ -6,6 +6,7 @@ over size and input strength, by the compiled twin (same bits but for rounding, 
 """
 
 from dataclasses import replace
+from functools import partial
 from itertools import product
 from typing import Any
 
@@ -13,13 +14,13 @@ import numpy as np
 
 from mcmj.core.body import Body
 from mcmj.core.random_body import BodySettings, draw_body
+from mcmj.experiments.blow_ups import or_lost
 from mcmj.experiments.capacity.config import TIMESTEP, Config
 from mcmj.experiments.capacity.result import MEASURES, Result, Worth
 from mcmj.metrics.capacity import generalisation_rank, kernel_rank, processing_capacity
 from mcmj.simulation.ensemble import Ensemble
 from mcmj.simulation.held_symbols import held_states
 from mcmj.simulation.simulation import Simulation
-from mcmj.utils.errors import DivergenceError
 from mcmj.utils.progress import OnSteps
 from mcmj.utils.seeds import stream
 from mcmj.utils.validation import Array
@@ -101,11 +102,9 @@ def _map(
     rows = []
     for settings, strength in cells:
         body = draw_body(config.seed, settings)
-        try:
-            worth = measure(config, body, strength, config.map_symbols, engine="twin")
-            rows.append(worth.measures)
-        except DivergenceError:
-            rows.append(dict.fromkeys(MEASURES, np.nan))
+        work = partial(measure, config, body, strength, config.map_symbols, engine="twin")
+        worth = or_lost(work, None)
+        rows.append(dict.fromkeys(MEASURES, np.nan) if worth is None else worth.measures)
         on_steps(1)
     return {
         m: np.array([row[m] for row in rows], dtype=np.float64).reshape(shape) for m in MEASURES

@@ -17,6 +17,7 @@ from mcmj.analysis.stability.tolerance import Trial, force_tolerance, noise_tole
 from mcmj.experiments.certify.config import Config
 from mcmj.experiments.certify.result import Result
 from mcmj.experiments.limit_cycle import config as limit_cycle
+from mcmj.experiments.limit_cycle.run import cycle_errors
 from mcmj.learning.teaching import synchronise, teach
 from mcmj.metrics import orbits
 from mcmj.reference.twin.population import rest as rest_state
@@ -72,11 +73,7 @@ def _trained(config: Config, goal: Target) -> _Trained:
     last = round(config.window / simulation.timestep)
     simulation.rollout(max(1, round(config.free_run / simulation.timestep) - last), record=())
     outputs = simulation.rollout(last, record=("outputs",)).get("outputs")
-    errors = {
-        "orbit_error": orbits.orbit_error(outputs, goal),
-        "period_error": orbits.relative_period_error(outputs, simulation.timestep, goal),
-        "amplitude_error": orbits.relative_amplitude_error(outputs, goal),
-    }
+    errors = cycle_errors(outputs, simulation.timestep, goal)
     loop = ClosedLoop(body, w_out, simulation.timestep, threads=os.cpu_count() or 1)
     return _Trained(loop, loop.vector(simulation.state), outputs, errors)
 

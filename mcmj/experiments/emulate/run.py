@@ -10,17 +10,19 @@ and, above all, how well K knows p and q.
 """
 
 import warnings
+from functools import partial
 
 import numpy as np
 from scipy.integrate import solve_ivp
 
 from mcmj.analysis.emulation import emulation_body
+from mcmj.experiments.blow_ups import or_lost
 from mcmj.experiments.emulate.config import REPORTED, Config
 from mcmj.experiments.emulate.result import Cell, Result
 from mcmj.experiments.emulate.systems import System, mismatched, system, user_system
 from mcmj.metrics.convergence import observed_order
 from mcmj.simulation.simulation import Simulation
-from mcmj.utils.errors import DivergenceError, McmjError, StabilityWarning
+from mcmj.utils.errors import McmjError, StabilityWarning
 from mcmj.utils.progress import OnSteps
 from mcmj.utils.validation import Array
 
@@ -102,15 +104,13 @@ def emulation_error(states: Array, wanted: Array) -> float:
 def _cells(config: Config, one: System, *, sample_at: float = 0.5) -> dict[str, dict[float, Cell]]:
     wanted = {step: reference(one, step, config.horizon) for step in config.steps_ms}
 
-    def cell(integrator: str, step: float) -> Cell:
-        try:
-            states = emulate(one, integrator, step, config.horizon, sample_at=sample_at)
-        except DivergenceError:
-            return Cell(np.inf)
-        return Cell(emulation_error(states, wanted[step]))
+    def error(integrator: str, step: float) -> float:
+        states = emulate(one, integrator, step, config.horizon, sample_at=sample_at)
+        return emulation_error(states, wanted[step])
 
     return {
-        name: {step: cell(name, step) for step in config.steps_ms} for name in config.integrators
+        name: {step: Cell(or_lost(partial(error, name, step), np.inf)) for step in config.steps_ms}
+        for name in config.integrators
     }
 
 

@@ -7,8 +7,10 @@ import numpy as np
 
 from mcmj.core.body import Body
 from mcmj.core.readout import checked_readout
+from mcmj.experiments.blow_ups import or_lost
 from mcmj.experiments.gaits.config import Config, check, get_body
 from mcmj.experiments.gaits.result import BodyResult, Result, Run, Taught, measure, outcome
+from mcmj.learning.free_run import free_run
 from mcmj.learning.practice import practise
 from mcmj.learning.regression import Fit
 from mcmj.learning.teaching import Course, lessons_of, synchronise
@@ -146,23 +148,17 @@ def _run_gait(config: Config, simulation: Simulation, learnt: _Learnt, on_steps:
     if w_out is None:
         lost = measure(config, LOST, wanted)
         return Taught(wanted, None, None, lost, lost)
+
+    def run_free(seconds: float) -> Run:
+        steps = round(seconds / config.timestep)
+        found = or_lost(lambda: free_run(simulation, steps, on_steps=on_steps), LOST)
+        return measure(config, found, wanted)
+
     simulation.set_readout(w_out)
     simulation.reset()
-    from_rest = measure(config, _rollout(config, simulation, config.from_rest, on_steps), wanted)
+    from_rest = run_free(config.from_rest)
     simulation.restore(learnt.states[0])
-    free = measure(config, _rollout(config, simulation, config.free_run, on_steps), wanted)
-    return Taught(wanted, w_out, learnt.fit, free, from_rest)
-
-
-def _rollout(config: Config, simulation: Simulation, seconds: float, on_steps: OnSteps) -> Array:
-    parts = []
-    try:
-        for part in simulation.stream(round(seconds / config.timestep), record=("outputs",)):
-            parts.append(part.get("outputs"))
-            on_steps(len(part))
-    except DivergenceError:
-        return LOST
-    return np.concatenate(parts)
+    return Taught(wanted, w_out, learnt.fit, run_free(config.free_run), from_rest)
 
 
 def _switch(
@@ -170,10 +166,10 @@ def _switch(
 ) -> Run:
     """Go on in one gait, then replace its readout by another's, at once."""
     phases = [Phase(config.before, w_out=first.w_out), Phase(config.after, w_out=second.w_out)]
-    if not all(len(gait.free.outputs) for gait in (first, second)):
-        return measure(config, LOST, second.target)
-    try:
-        run = run_schedule(simulation, Schedule(phases), 0, on_steps=on_steps)
-    except DivergenceError:
+    run = None
+    if len(first.free.outputs) and len(second.free.outputs):
+        schedule = Schedule(phases)
+        run = or_lost(lambda: run_schedule(simulation, schedule, 0, on_steps=on_steps), None)
+    if run is None:
         return measure(config, LOST, second.target)
     return measure(config, run.feedback, second.target, switched=run.boundaries[1])

@@ -17,6 +17,7 @@ from scipy.integrate import solve_ivp
 
 from mcmj.core.body import spring_lengths
 from mcmj.core.readout import Readout
+from mcmj.experiments.blow_ups import or_lost
 from mcmj.experiments.hard_cases.bodies import CASES, HardCase
 from mcmj.experiments.hard_cases.config import Config
 from mcmj.experiments.hard_cases.result import Result, Row
@@ -95,11 +96,8 @@ def bisect(stable: Callable[[float], bool], guess: float, precision: float) -> f
 
 def is_stable(case: HardCase, integrator: str, step: float, steps: int, reach: float) -> bool:
     """Whether a run stays finite and every spring within `reach` [m] of its rest length."""
-    try:
-        with np.errstate(over="ignore"):  # speeds of 1e200 m/s
-            lengths = simulate(case, integrator, step, steps)
-    except DivergenceError:
-        return False
+    with np.errstate(over="ignore"):  # speeds of 1e200 m/s
+        lengths = or_lost(lambda: simulate(case, integrator, step, steps), np.inf)
     return bool((np.abs(lengths - case.body.rest_lengths) <= reach).all())
 
 

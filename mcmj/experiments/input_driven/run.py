@@ -1,9 +1,11 @@
 """Figs. 10 and 11: one body, one static readout; a constant input chooses the rhythm."""
 
 from collections.abc import Mapping, Sequence
+from functools import partial
 
 import numpy as np
 
+from mcmj.experiments.blow_ups import or_lost
 from mcmj.experiments.input_driven.config import (
     SYSTEM,
     Config,
@@ -15,13 +17,14 @@ from mcmj.experiments.input_driven.config import (
 from mcmj.experiments.input_driven.lessons import course_lesson, teach
 from mcmj.experiments.input_driven.result import BodyResult, Held, Outcome, Result
 from mcmj.experiments.input_driven.sweep import Sweep, branches
+from mcmj.learning.free_run import free_run
 from mcmj.learning.practice import Practised
 from mcmj.learning.teaching import Lesson
 from mcmj.metrics import orbits
 from mcmj.simulation.simulation import Simulation
 from mcmj.targets.input_profiles import Profile, hold
 from mcmj.targets.limit_cycles import Target
-from mcmj.utils.errors import DivergenceError, InvalidArgumentError
+from mcmj.utils.errors import InvalidArgumentError
 from mcmj.utils.progress import OnSteps
 from mcmj.utils.validation import Array
 
@@ -75,9 +78,8 @@ def _of_seed(config: Config, seed: int, lesson: Lesson | None, on_steps: OnSteps
     assert lesson is not None
     body = get_start(config, seed).body
     simulation = Simulation(body, timestep=config.timestep, engine=config.engine)
-    try:
-        practised = teach(config, simulation, lesson, seed, on_steps)
-    except DivergenceError:
+    practised = or_lost(lambda: teach(config, simulation, lesson, seed, on_steps), None)
+    if practised is None:
         return Outcome(dict.fromkeys(config.inputs, np.inf), ())
     held = _jump(config, simulation, config.inputs, on_steps)
     return _outcome(config, held, practised)
@@ -108,10 +110,8 @@ def _jump(
     held = {}
     for value in inputs:
         simulation.restore(state)
-        try:
-            outputs = drive(simulation, Profile([hold(value, config.free_run)]), on_steps)
-        except DivergenceError:
-            outputs = np.zeros((0, 2))
+        constant = Profile([hold(value, config.free_run)])
+        outputs = or_lost(partial(drive, simulation, constant, on_steps), np.zeros((0, 2)))
         held[value] = measure(config, SYSTEM.cycle(value), outputs)
     return held
 
@@ -141,11 +141,12 @@ def _sweep(
     profile = sweep_profile(config, taught)
     step = config.timestep
     times = step * np.arange(round(profile.duration / step), dtype=np.float64)
-    try:
+
+    def sweep() -> Array:
         drive(simulation, Profile([hold(profile.ramps[0].start, LEAD_IN)]), on_steps)
-        outputs = drive(simulation, profile, on_steps)
-    except DivergenceError:
-        outputs = np.zeros((len(times), 2))  # no cycles: the rhythm was lost
+        return drive(simulation, profile, on_steps)
+
+    outputs = or_lost(sweep, np.zeros((len(times), 2)))  # no cycles where the rhythm was lost
     wanted = SYSTEM.follow(profile)(times)
     return Sweep(*(branches(profile, signal[:, 0], step) for signal in (outputs, wanted)))
 
@@ -158,11 +159,7 @@ def drive(simulation: Simulation, profile: Profile, on_steps: OnSteps) -> Array:
     """
     steps = np.arange(round(profile.duration / simulation.timestep))
     inputs = profile(simulation.timestep * steps)[:, None]
-    parts = []
-    for part in simulation.stream(inputs=inputs, record=("outputs",)):
-        parts.append(part.get("outputs"))
-        on_steps(len(part))
-    return np.concatenate(parts)
+    return free_run(simulation, len(steps), inputs=inputs, on_steps=on_steps)
 
 
 def _check_window(config: Config, target: Target) -> None:

@@ -176,7 +176,7 @@ def _run_task(
         times=config.timestep * np.arange(start, start + total, dtype=np.float64),
         outputs=outputs,
         positions=end.positions,
-        errors=_errors(outputs[-last:], config.timestep, wanted),
+        errors=cycle_errors(outputs[-last:], config.timestep, wanted),
         windows=(
             window_errors(outputs, config.timestep, wanted, length=config.windows)
             if config.windows
@@ -200,7 +200,8 @@ def _ready(
     return None
 
 
-def _errors(outputs: Array, timestep: float, wanted: Target) -> dict[str, float]:
+def cycle_errors(outputs: Array, timestep: float, wanted: Target) -> dict[str, float]:
+    """Orbit, period and amplitude errors of outputs (T, n_outputs), see mcmj.metrics.orbits."""
     return {
         "orbit_error": orbits.orbit_error(outputs, wanted),
         "period_error": orbits.relative_period_error(outputs, timestep, wanted),

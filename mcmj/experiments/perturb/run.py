@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 
 from mcmj.core.body import Body
+from mcmj.experiments.blow_ups import or_lost
 from mcmj.experiments.perturb.config import Config
 from mcmj.experiments.perturb.result import LOST, BodyResult, Recovery, Result
 from mcmj.learning.teaching import teach
@@ -13,7 +14,6 @@ from mcmj.simulation.run_phases import Phase, Schedule, run_schedule
 from mcmj.simulation.simulation import Simulation
 from mcmj.targets.limit_cycles import Target
 from mcmj.targets.named import named_target, require_outputs
-from mcmj.utils.errors import DivergenceError
 from mcmj.utils.progress import OnSteps
 
 # what a search over many bodies leaves out, see mcmj.search.experiment
@@ -43,9 +43,8 @@ def _of_body(config: Config, seed: int, wanted: Target, on_steps: OnSteps) -> Bo
     require_outputs(body, wanted)
     simulation = Simulation(body, engine=config.engine, **settings)
     curve = [Phase(config.window, length_noise=std) for std in config.noise_curve]
-    try:
-        fit = teach(simulation, wanted, config.teaching, seed, on_steps=on_steps)
-    except DivergenceError:
+    fit = or_lost(lambda: teach(simulation, wanted, config.teaching, seed, on_steps=on_steps), None)
+    if fit is None:
         lost = dict.fromkeys(config.perturbations, LOST)
         return BodyResult(body, source, None, np.inf, lost, np.full(len(curve), np.inf))
     start = simulation.snapshot()
@@ -74,9 +73,8 @@ def disturb(
 ) -> Recovery:
     """Run free, disturbed and free again; a body that blows up has not recovered."""
     schedule = Schedule([Phase(config.before), phase, Phase(config.after)])
-    try:
-        run = run_schedule(simulation, schedule, seed, on_steps=on_steps)
-    except DivergenceError:
+    run = or_lost(lambda: run_schedule(simulation, schedule, seed, on_steps=on_steps), None)
+    if run is None:
         return LOST
     free = run.feedback[run.phase(-1)]
     last = free[-round(config.error_window / config.timestep) :]

@@ -3,9 +3,11 @@
 import numpy as np
 
 from mcmj.core.body import Body
+from mcmj.experiments.blow_ups import or_lost
 from mcmj.experiments.limit_cycle import config as limit_cycle
 from mcmj.experiments.swing_up.config import Config
 from mcmj.experiments.swing_up.result import Result, SwingUp
+from mcmj.learning.free_run import free_run
 from mcmj.learning.practice import practise
 from mcmj.learning.teaching import Course, lessons_of
 from mcmj.metrics import orbits
@@ -86,12 +88,8 @@ def _free_run(
     simulation.reset()
     if velocities is not None:
         simulation.set_state(velocities=velocities)
-    try:
-        return simulation.rollout(steps, record=("outputs",)).get("outputs")
-    except DivergenceError:
-        return np.zeros((0, simulation.body.n_outputs))
-    finally:
-        on_steps(steps)
+    nothing = np.zeros((0, simulation.body.n_outputs))
+    return or_lost(lambda: free_run(simulation, steps, on_steps=on_steps), nothing)
 
 
 def _end_error(config: Config, outputs: Array, wanted: Target) -> float:

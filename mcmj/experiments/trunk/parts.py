@@ -4,6 +4,7 @@ from collections.abc import Callable
 
 import numpy as np
 
+from mcmj.experiments.blow_ups import or_lost
 from mcmj.experiments.trunk.config import Config
 from mcmj.experiments.trunk.result import Gait, Table, fell, forward_speed
 from mcmj.metrics import orbits as metrics
@@ -97,11 +98,8 @@ def _end_of(
     config: Config, gait: Gait, walker: TrunkWalker, duration: float, *, push: float = 0.0
 ) -> Table:
     """How a walk from now on ends: its last part, half of it at most."""
-    try:
-        walk = walker.walk(duration, push=push)
-    except DivergenceError:
-        return {"falls": 1, "speed_m_s": None, "orbit_error": None}
-    if fell(gait, walk):
+    walk = or_lost(lambda: walker.walk(duration, push=push), None)
+    if walk is None or fell(gait, walk):
         return {"falls": 1, "speed_m_s": None, "orbit_error": None}
     last = walk.after(duration - min(config.judged, duration / 2))
     error = metrics.orbit_error(last.outputs[0], gait.target)
