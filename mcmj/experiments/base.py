@@ -11,6 +11,8 @@ from matplotlib.figure import Figure
 from rich.console import Console
 from rich.table import Table
 
+from mcmj.core.integrators import DEFAULT_INTEGRATOR
+from mcmj.mjcf.write import to_mjcf
 from mcmj.pictures.plotting import save
 from mcmj.utils import files
 from mcmj.utils.progress import OnSteps, progress_bar
@@ -90,6 +92,25 @@ def table_of(title: str, *columns: str, words: int = 1) -> Table:
     for name in columns[words:]:
         table.add_column(name, justify="right")
     return table
+
+
+def write_body(result: Any, source: Mapping[str, object], folder: Path) -> None:
+    """body.xml: a result's body with all its readouts, the first of them active.
+
+    Args:
+        result: with config, body and readouts by name.
+        source: where the body comes from.
+    """
+    config, readouts = result.config, result.readouts
+    xml = to_mjcf(
+        result.body,
+        timestep=config.timestep,
+        integrator=getattr(config, "integrator", DEFAULT_INTEGRATOR),
+        w_out=next(iter(readouts.values()), None),
+        readouts=readouts,
+        provenance={"body": source, "config": files.plain(config)},
+    )
+    files.write_text(folder / "body.xml", xml)
 
 
 def carry_out(experiment: Experiment, config: Any, output: Output, folder: Path) -> None:

@@ -5,27 +5,18 @@ from pathlib import Path
 import numpy as np
 from rich.console import Console
 
-from mcmj.experiments.base import Experiment, counting, table_of
+from mcmj.experiments.base import Experiment, counting, table_of, write_body
 from mcmj.experiments.gaits.config import Config, total_steps
 from mcmj.experiments.gaits.figure import figures
 from mcmj.experiments.gaits.result import Result
 from mcmj.experiments.gaits.run import run
-from mcmj.mjcf.write import to_mjcf
 from mcmj.utils import files
 
 
 def write(result: Result, out: Path) -> None:
     """body.xml with all readouts, and the first body's runs."""
     config, first = result.config, result.first
-    readouts = result.readouts
-    xml = to_mjcf(
-        result.body,
-        timestep=config.timestep,
-        w_out=next(iter(readouts.values()), None),
-        readouts=readouts,
-        provenance={"body": first.source, "config": files.plain(config)},
-    )
-    files.write_text(out / "body.xml", xml)
+    write_body(result, first.source, out)
     arrays = {"timestep": np.array(config.timestep)}
     for name, gait in first.gaits.items():
         arrays[f"{name}/outputs"] = gait.free.outputs

@@ -6,9 +6,10 @@ from pathlib import Path
 
 import numpy as np
 
-from mcmj.search.experiment import Score, default_score, make_config
-from mcmj.search.overrides import override, parse_assignment, value_at
-from mcmj.search.space import MAX_SEED, MAX_TRIALS, Space, parse_dimension
+from mcmj.experiments.search.config import Searched
+from mcmj.search.experiment import Score, make_config
+from mcmj.search.overrides import override, value_at
+from mcmj.search.space import MAX_SEED, MAX_TRIALS
 from mcmj.utils.errors import InvalidArgumentError
 from mcmj.utils.validation import Array, require_count, require_name, require_number
 
@@ -29,7 +30,7 @@ OBJECTIVES: dict[str, Callable[[Array, Score], float]] = {
 
 
 @dataclass(frozen=True)
-class Config:
+class Config(Searched):
     """What to search.
 
     Attributes:
@@ -92,22 +93,10 @@ class Config:
             value_at(self.hand_chosen, path)
 
     @property
-    def space(self) -> Space:
-        """What is varied, by path."""
-        return dict(parse_dimension(text) for text in self.vary)
-
-    @property
     def hand_chosen(self) -> object:
         """The experiment's config without a search."""
-        fixed = dict(parse_assignment(text) for text in self.set)
-        one = make_config(self.experiment, fixed)
+        one = make_config(self.experiment, self.fixed)
         return override(one, {"engine": self.engine}) if hasattr(one, "engine") else one
-
-    @property
-    def target(self) -> Score:
-        """What a trial is after."""
-        path = self.score or default_score(self.experiment)
-        return Score(path, self.threshold, self.maximise)
 
     @property
     def large_is_good(self) -> bool:

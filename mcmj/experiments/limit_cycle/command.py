@@ -8,7 +8,7 @@ from rich.console import Console
 from rich.table import Table
 
 from mcmj.core.random_body import draw_body
-from mcmj.experiments.base import Experiment, counting, table_of
+from mcmj.experiments.base import Experiment, counting, table_of, write_body
 from mcmj.experiments.limit_cycle.config import Config, total_steps
 from mcmj.experiments.limit_cycle.figure import figures
 from mcmj.experiments.limit_cycle.result import Result
@@ -23,16 +23,7 @@ from mcmj.utils import files
 def write(result: Result, out: Path) -> None:
     """body.xml with all readouts, and the free runs."""
     config, tasks = result.config, result.tasks
-    readouts = result.readouts
-    xml = to_mjcf(
-        result.body,
-        timestep=config.timestep,
-        integrator=config.integrator,
-        w_out=next(iter(readouts.values()), None),
-        readouts=readouts,
-        provenance={"body": result.source, "config": files.plain(config)},
-    )
-    files.write_text(out / "body.xml", xml)
+    write_body(result, result.source, out)
     arrays = {"timestep": np.array(config.timestep)}
     for name, task in tasks.items():
         arrays[f"{name}/start_time"], arrays[f"{name}/outputs"] = task.times[0], task.outputs

@@ -12,8 +12,35 @@ from mcmj.utils.errors import InvalidArgumentError
 from mcmj.utils.validation import require_count, require_number
 
 
+class Searched:
+    """What the configs of searches have in common: an experiment, and the score of its trials."""
+
+    experiment: str
+    set: tuple[str, ...]
+    vary: tuple[str, ...]
+    score: str | None
+    threshold: float
+    maximise: bool
+
+    @property
+    def fixed(self) -> dict[str, object]:
+        """Values for all trials, by path."""
+        return dict(parse_assignment(text) for text in self.set)
+
+    @property
+    def space(self) -> Space:
+        """What is varied, by path."""
+        return dict(parse_dimension(text) for text in self.vary)
+
+    @property
+    def target(self) -> Score:
+        """What the search is after."""
+        path = self.score or default_score(self.experiment)
+        return Score(path, self.threshold, self.maximise)
+
+
 @dataclass(frozen=True)
-class Config:
+class Config(Searched):
     """What to search. Settings are combined with each other, and each with every seed.
 
     Attributes:
@@ -77,25 +104,9 @@ class Config:
         self.trials  # noqa: B018  # builds, so checks, the configs of all trials
 
     @property
-    def fixed(self) -> dict[str, object]:
-        """Values for all trials, by path."""
-        return dict(parse_assignment(text) for text in self.set)
-
-    @property
-    def space(self) -> Space:
-        """What is varied, by path."""
-        return dict(parse_dimension(text) for text in self.vary)
-
-    @property
     def settings(self) -> list[dict[str, object]]:
         """All settings, values by path."""
         return expand(self.space, self.draws, self.draw_seed)
-
-    @property
-    def target(self) -> Score:
-        """What the search is after."""
-        path = self.score or default_score(self.experiment)
-        return Score(path, self.threshold, self.maximise)
 
     @property
     def trials(self) -> list[Trial]:
