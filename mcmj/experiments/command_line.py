@@ -4,6 +4,7 @@ import hashlib
 import json
 import re
 import sys
+import textwrap
 import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import fields, is_dataclass, replace
@@ -22,6 +23,7 @@ from mcmj.utils.files import only_run, prepare_folder
 from mcmj.utils.gl_backend import check_backend
 
 LONGEST_NAME = 80  # of a folder
+WIDTH = 80  # of help texts
 
 
 def main(arguments: Sequence[str]) -> None:
@@ -75,20 +77,34 @@ def parse(experiment: Experiment, arguments: Sequence[str]) -> tuple[Any, Output
     ) -> tuple[Any, Output]:
         return config, output
 
-    both.__annotations__["config"] = Annotated[experiment.config, tyro.conf.OmitArgPrefixes]
+    unnamed = tyro.conf.arg(name="")  # "config" is no word of the user's
+    both.__annotations__["config"] = Annotated[
+        experiment.config, tyro.conf.OmitArgPrefixes, unnamed
+    ]
     return tyro.cli(
         both,
         prog=f"mcmj {experiment.name}",
         args=list(arguments),
-        description=experiment.about,
+        description=_wrapped(experiment.about),
     )
+
+
+def _wrapped(text: str) -> str:
+    """Paragraphs as lines of a help text; tyro keeps the breaks of lines that are indented."""
+    paragraphs = (" ".join(one.split()) for one in text.split("\n\n"))
+    wrap = textwrap.TextWrapper(WIDTH, initial_indent="  ", subsequent_indent="  ")
+    return "\n".join(wrap.fill(one) for one in paragraphs)
 
 
 def default_folder(experiment: Experiment, config: Any) -> Path:
     """results/<name>, and the options that are not the default, so that no command overwrites
     the results of another."""
     changes = changed_fields(experiment.config(), config)
-    text = "-".join([experiment.name, *(f"{name}={value}" for name, value in changes.items())])
+    told = (
+        f"{name}={'+'.join(map(str, value)) if isinstance(value, tuple) else value}"
+        for name, value in changes.items()
+    )
+    text = "-".join([experiment.name, *told])
     plain = re.sub(r"[^\w.,=+-]+", "_", text)
     if len(plain) > LONGEST_NAME:
         plain = f"{plain[:LONGEST_NAME]}-{hashlib.sha256(text.encode()).hexdigest()[:8]}"

@@ -44,8 +44,8 @@ class Config:
         timestep: control and physics step [s].
         integrator: as for Simulation.
         engine: mujoco, or twin: faster, the same to rounding, no video.
-        windows: length of the consecutive windows of the free run whose errors are given too
-            [s]; 0: none.
+        windows: length [s] of the consecutive windows of the free run whose errors are given
+            too; 0: none.
         measure_cost: measure what a step in closed loop costs in MuJoCo.
         settings: what a random body is drawn from.
         teaching: how the readout is taught.
