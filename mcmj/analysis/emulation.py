@@ -12,7 +12,6 @@ They also make any x' = F(x) of order n: `lift`.
 """
 
 from collections.abc import Callable, Sequence
-from typing import Any
 
 import numba
 import numpy as np
@@ -23,10 +22,10 @@ from mcmj.core.body import Body
 from mcmj.core.callbacks.coupled_laws import CoupledLaw
 from mcmj.core.callbacks.spring_laws import SpringLaw
 from mcmj.utils.errors import InvalidArgumentError
-from mcmj.utils.validation import require_count, require_number
+from mcmj.utils.validation import Array, require_count, require_number
 
 Acceleration = Callable[[float, float], float]
-Accelerations = Callable[[Any, Any, Any], None]
+Accelerations = Callable[[Array, Array, Array], None]
 
 
 SPRING = 3.0, 150.0, 1.0, 150.0  # k1, k3, d1, d3 (SI)
@@ -52,10 +51,10 @@ def static_feedback(name: str, g: Acceleration, *, mismatch: float = 0.0) -> Spr
         mismatch: what K does not know of p and q: K = (1 - mismatch) (p + q) + G. A negative
             one leaves a spring and a damper of the wrong sign.
     """
-    compiled = numba.njit(g)
+    compiled: Acceleration = numba.njit(g)
     known = 1.0 - mismatch
 
-    def pull(x1, x2, k1, k3, d1, d3):
+    def pull(x1: float, x2: float, k1: float, k3: float, d1: float, d3: float) -> float:
         passive = x1 * (k1 + k3 * x1 * x1) + x2 * (d1 + d3 * x2 * x2)
         feedback = known * passive + compiled(x1, x2)
         return passive - feedback
@@ -71,9 +70,9 @@ def coupled_feedback(name: str, g: Accelerations) -> CoupledLaw:
         g: function (x, v, out) that Numba can compile: elongations and rates (n,), writes
             the accelerations G_i [m/s^2] to out (n,).
     """
-    compiled = numba.njit(g)
+    compiled: Accelerations = numba.njit(g)
 
-    def pull(x1, x2, parameters, out):
+    def pull(x1: Array, x2: Array, parameters: Array, out: Array) -> None:
         compiled(x1, x2, out)
         for i in range(len(x1)):
             k1, k3, d1, d3 = parameters[i]
@@ -111,7 +110,7 @@ def lift(
     accelerations = field.jacobian(list(states)) * speeds - contraction * (speeds - field)
     function = _vector_function(states, speeds, accelerations)
 
-    def g(x, v, out):
+    def g(x: Array, v: Array, out: Array) -> None:
         values = function(x, v)
         for i in range(len(out)):
             out[i] = values[i]
@@ -137,13 +136,17 @@ def scalar_function(expression: str) -> Acceleration:
         raise InvalidArgumentError(
             "g", f"an expression in {', '.join(NAMES)}", f"{expression!r}, with {strange}"
         )
-    return sp.lambdify(symbols, sp.Float(1.0) * parsed, modules="math")
+    found: Acceleration = sp.lambdify(symbols, sp.Float(1.0) * parsed, modules="math")
+    return found
 
 
-def _vector_function(states: Sequence[sp.Symbol], speeds: sp.Matrix, expressions: sp.Matrix):
+def _vector_function(
+    states: Sequence[sp.Symbol], speeds: sp.Matrix, expressions: sp.Matrix
+) -> Callable[[Array, Array], tuple[float, ...]]:
     """Compiled function (x, v) -> tuple of numbers."""
     x, v = sp.DeferredVector("x"), sp.DeferredVector("v")
     names = {s: x[i] for i, s in enumerate(states)} | {s: v[i] for i, s in enumerate(speeds)}
-    return numba.njit(
+    found: Callable[[Array, Array], tuple[float, ...]] = numba.njit(
         sp.lambdify([x, v], tuple(sp.Float(1.0) * e.subs(names) for e in expressions), "math")
     )
+    return found

@@ -191,7 +191,7 @@ def _determinant(matrix: sp.Matrix) -> sp.Expr:
 
 def _rank(matrix: sp.Matrix) -> int:
     """Exact; symbols that are left stand for parameters in general position."""
-    return DomainMatrix.from_Matrix(matrix).to_field().rank()
+    return int(DomainMatrix.from_Matrix(matrix).to_field().rank())
 
 
 def _shortened(expression: object) -> str:

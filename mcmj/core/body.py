@@ -9,6 +9,7 @@ and spring j with x1 = l - l0 and x2 = dl/dt:
 """
 
 from dataclasses import dataclass, fields
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -56,7 +57,7 @@ class Body:
         positions = _checked_positions(self.positions)
         springs = _checked_springs(self.springs, positions)
         n, n_springs = len(positions), len(springs)
-        arrays: dict[str, npt.NDArray] = {"positions": positions, "springs": springs}
+        arrays: dict[str, npt.NDArray[Any]] = {"positions": positions, "springs": springs}
         for name in ("k1", "k3", "d1", "d3"):
             arrays[name] = as_array(name, getattr(self, name), (n_springs,))
             require_above(name, arrays[name], 0.0, strict=name in ("k1", "d1"))
@@ -90,7 +91,7 @@ class Body:
 
     __hash__ = None  # type: ignore[assignment]
 
-    def __reduce__(self) -> tuple[type["Body"], tuple[npt.NDArray, ...]]:
+    def __reduce__(self) -> tuple[type["Body"], tuple[npt.NDArray[Any], ...]]:
         """Copies and what is unpickled come from the constructor: checked, and read-only."""
         return type(self), tuple(getattr(self, field.name) for field in fields(self))
 
@@ -107,12 +108,12 @@ class Body:
     @property
     def n_inputs(self) -> int:
         """Number of input channels."""
-        return self.w_in.shape[1]
+        return int(self.w_in.shape[1])
 
     @property
     def n_outputs(self) -> int:
         """Number of outputs, each fed back by a channel."""
-        return self.w_fb.shape[1]
+        return int(self.w_fb.shape[1])
 
     @property
     def free(self) -> npt.NDArray[np.int64]:
@@ -129,7 +130,8 @@ class Body:
 def spring_lengths(positions: Array, springs: npt.NDArray[np.int64]) -> Array:
     """Lengths |p_b - p_a| (..., L) [m] of springs (a, b) at positions (..., N, 2)."""
     ends = positions[..., springs, :]
-    return np.linalg.norm(ends[..., 1, :] - ends[..., 0, :], axis=-1)
+    found: Array = np.linalg.norm(ends[..., 1, :] - ends[..., 0, :], axis=-1)
+    return found
 
 
 def _checked_positions(value: object) -> Array:

@@ -66,14 +66,16 @@ class Readout:
     def outputs_by_row(self, signals: Array) -> Array:
         """Outputs y (.., T, n_outputs) of signals (.., T, n_signals), each row for itself."""
         across = np.ascontiguousarray(np.swapaxes(self.weights, -1, -2))
-        return np.einsum("...tl,...cl->...tc", signals, across) + self.bias[..., None, :]
+        found: Array = np.einsum("...tl,...cl->...tc", signals, across) + self.bias[..., None, :]
+        return found
 
     def weighted(self, signals: Array) -> Array:
         """W^T s (T, n_outputs) of signals (T, n_signals), without bias: what noise becomes.
 
         Each row for itself, summed in the order of the signals.
         """
-        return np.einsum("tl,lc->tc", signals, self.weights)
+        found: Array = np.einsum("tl,lc->tc", signals, self.weights)
+        return found
 
 
 def readout_rows(value: object, n_signals: int, n_outputs: int, name: str = "w_out") -> Array:

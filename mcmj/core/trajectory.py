@@ -76,7 +76,7 @@ class Trajectory:
         Raises:
             UnknownNameError: it was not recorded.
         """
-        array = getattr(self, name) if name in TIME_AXIS else None
+        array: Array | None = getattr(self, name) if name in TIME_AXIS else None
         if array is None:
             recorded = [n for n in TIME_AXIS if getattr(self, n) is not None]
             raise UnknownNameError("recorded array", name, recorded)

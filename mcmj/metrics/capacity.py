@@ -167,7 +167,8 @@ def _orthonormal(states: Array) -> Array:
     u, values, _ = svd(centred, full_matrices=False)
     # lengths of 100 m move by 0.1 m or less: what is below their rounding is no information
     rounding = np.finfo(float).eps * np.sqrt(len(states)) * np.abs(states).max()
-    return u[:, values > max(10 * rounding, values[0] * 1e-12)]
+    found: Array = u[:, values > max(10 * rounding, values[0] * 1e-12)]
+    return found
 
 
 def _polynomials(u: Array, longest: int, degrees: int) -> Array:
@@ -185,4 +186,5 @@ def _terms(max_delays: Sequence[int]) -> Iterator[Term]:
 
 
 def _product(polynomials: Array, term: Term) -> Array:
-    return np.prod([polynomials[delay, degree] for delay, degree in term], axis=0)
+    found: Array = np.prod([polynomials[delay, degree] for delay, degree in term], axis=0)
+    return found

@@ -33,7 +33,8 @@ def duty_factors(outputs: Array, timestep: float, period: float) -> Array:
     Raises:
         InvalidArgumentError: less than a period.
     """
-    return in_stance(outputs)[-_whole_periods(outputs, timestep, period) :].mean(axis=0)
+    found: Array = in_stance(outputs)[-_whole_periods(outputs, timestep, period) :].mean(axis=0)
+    return found
 
 
 def phase_lags(outputs: Array, timestep: float, period: float) -> Array:
@@ -118,7 +119,8 @@ def target_duty_factors(target: Target) -> Array:
     """Duty factors (n,) of a target's legs."""
     orbit = target.orbit(orbits.ORBIT_POINTS)
     around = np.vstack([orbit[-1:], orbit, orbit[:1]])
-    return in_stance(around)[1:-1].mean(axis=0)
+    found: Array = in_stance(around)[1:-1].mean(axis=0)
+    return found
 
 
 def _whole_periods(outputs: Array, timestep: float, period: float) -> int:

@@ -181,7 +181,8 @@ def _to_segment(points: Array, start: Array, end: Array) -> Array:
     squared = (along**2).sum(axis=1)
     fraction = ((points - start) * along).sum(axis=1) / np.where(squared > 0, squared, 1.0)
     foot = start + np.clip(fraction, 0.0, 1.0)[:, None] * along
-    return np.linalg.norm(points - foot, axis=1)
+    found: Array = np.linalg.norm(points - foot, axis=1)
+    return found
 
 
 def _first_repeat(values: Array, guess: float) -> tuple[float, int]:

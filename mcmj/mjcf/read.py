@@ -212,7 +212,7 @@ def _integrator(model: mujoco.MjModel) -> str:
                 return row.name
         elif running == f"mjINT_{row.mujoco_name.upper()}":
             found = row.name
-    return found
+    return str(found)
 
 
 def _timing(model: mujoco.MjModel) -> tuple[float, float, float]:
@@ -320,4 +320,5 @@ def _text(model: mujoco.MjModel, name: str) -> str | None:
     if index < 0:
         return None
     start = model.text_adr[index]
-    return model.text_data[start : start + model.text_size[index] - 1].decode()
+    found: str = model.text_data[start : start + model.text_size[index] - 1].decode()
+    return found

@@ -93,7 +93,8 @@ class Film:
     def drawn_positions(self, index: int) -> Array:
         """Node positions (N, 2) [m] as drawn, displacements magnified."""
         rest = self.body.positions
-        return rest + self.scale * (self.positions[index] - rest)
+        found: Array = rest + self.scale * (self.positions[index] - rest)
+        return found
 
     def colours(self, index: int) -> Array:
         """Of the springs by their strains (L, 3)."""
@@ -104,7 +105,8 @@ class Film:
         if self.forces is None or self.largest_force == 0.0:
             return np.zeros(self.body.n_nodes)
         longest = ARROW_SHARE * max(frame(self.body)[2:])
-        return longest * self.forces[index] / self.largest_force
+        found: Array = longest * self.forces[index] / self.largest_force
+        return found
 
     def label(self, index: int) -> str:
         """What happens at a time, from the windows around it."""

@@ -63,7 +63,7 @@ class GLView:
         self._renderer.update_scene(data, camera="top")
         for node in np.flatnonzero(np.abs(arrows) > 0.01 * self._extent):
             self._add_arrow(positions[node], float(arrows[node]))
-        picture = self._renderer.render()
+        picture: Picture = self._renderer.render()
         if self._paint_white:
             empty = (picture[..., 0] | picture[..., 1] | picture[..., 2]) == 0
             picture += np.uint8(255) * empty[..., None]

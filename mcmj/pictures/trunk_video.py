@@ -82,4 +82,5 @@ def _picture(
     # along -z with y upwards, from a little above the ground
     camera.distance, camera.azimuth, camera.elevation = 3.4, 90.0, -100.0
     renderer.update_scene(data, camera)
-    return renderer.render()
+    found: Picture = renderer.render()
+    return found

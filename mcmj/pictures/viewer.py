@@ -109,7 +109,7 @@ class Viewer:
     @property
     def is_open(self) -> bool:
         """Until the window is closed."""
-        return self._handle.is_running()
+        return bool(self._handle.is_running())
 
     def press(self, key: int) -> None:
         """As if the key had been pressed in the window."""

@@ -46,7 +46,8 @@ class LegReadout:
 def lift_of(outputs: Array) -> Array:
     """How far each leg is lifted (T, n), 0 to 1, when outputs (T, n) say where it is."""
     rate = np.gradient(outputs, axis=0)
-    return np.clip(rate / rate.max(axis=0), 0.0, 1.0)
+    found: Array = np.clip(rate / rate.max(axis=0), 0.0, 1.0)
+    return found
 
 
 def teach_lift(

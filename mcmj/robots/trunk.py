@@ -159,7 +159,8 @@ def muscle_lengths(trunk: Trunk, swing: npt.ArrayLike, lift: npt.ArrayLike) -> A
     leg = np.repeat(np.arange(len(LEGS)), 2)
     moved = np.stack([settings.swing * x, settings.lift * z], axis=-1)[:, leg]
     legs = body.positions[muscles[:, 1]] + moved - body.positions[muscles[:, 0]]
-    return np.linalg.norm(legs, axis=-1) - body.rest_lengths[trunk.n_sensed :]
+    found: Array = np.linalg.norm(legs, axis=-1) - body.rest_lengths[trunk.n_sensed :]
+    return found
 
 
 def muscle_target(trunk: Trunk, gait: str, pace: float) -> Target:

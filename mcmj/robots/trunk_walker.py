@@ -123,7 +123,8 @@ class TrunkWalker:
     @property
     def state(self) -> Array:
         """All that `restore` needs (n,); readout and gate stay what they are."""
-        return self._batch.state[0].copy()
+        found: Array = self._batch.state[0].copy()
+        return found
 
     @property
     def w_out(self) -> Array:

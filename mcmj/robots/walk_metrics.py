@@ -86,25 +86,29 @@ def fall_times(walk: Walk, leg: float, slope: float = 0.0) -> Array:
 
 def distances(walk: Walk) -> Array:
     """Distance (copies,) [m] as the crow flies, from the first sample to the last."""
-    return np.linalg.norm(walk.trunk[:, -1, :3] - walk.trunk[:, 0, :3], axis=-1)
+    found: Array = np.linalg.norm(walk.trunk[:, -1, :3] - walk.trunk[:, 0, :3], axis=-1)
+    return found
 
 
 def speeds(walk: Walk) -> Array:
     """Distance over time (copies,) [m/s]."""
-    return distances(walk) / (walk.times[-1] - walk.times[0])
+    found: Array = distances(walk) / (walk.times[-1] - walk.times[0])
+    return found
 
 
 def costs_of_transport(walk: Walk, weight: float) -> Array:
     """Positive mechanical work of the servos over weight [N] times distance (copies,)."""
     work = walk.power[:, 1:].sum(axis=1) * walk.sample
-    return work / (weight * np.maximum(distances(walk), 1e-9))
+    found: Array = work / (weight * np.maximum(distances(walk), 1e-9))
+    return found
 
 
 def turns(walk: Walk) -> Array:
     """By how much the heading changes (copies,) [rad], left positive."""
     w, x, y, z = np.moveaxis(walk.trunk[..., 3:], -1, 0)
     heading = np.unwrap(np.arctan2(2 * (w * z + x * y), 1 - 2 * (y**2 + z**2)), axis=-1)
-    return heading[:, -1] - heading[:, 0]
+    found: Array = heading[:, -1] - heading[:, 0]
+    return found
 
 
 def stride_period(walk: Walk, guess: float, copy: int = 0) -> float:

@@ -82,7 +82,7 @@ class Walker:
     @property
     def copies(self) -> int:
         """Number of robots."""
-        return self._batch.nsim
+        return int(self._batch.nsim)
 
     @property
     def mass(self) -> float:
@@ -122,7 +122,8 @@ class Walker:
 
     def snapshot(self) -> Array:
         """States of all copies (copies, n)."""
-        return self._batch.state.copy()
+        found: Array = self._batch.state.copy()
+        return found
 
     def restore(self, states: Array) -> None:
         """States from snapshots, (copies, n) or (n,) for all; the gait stays what it is."""
@@ -212,7 +213,8 @@ class Walker:
         self._batch.ctrl = 0.0
         self._hear(self._readout)
         self._check_alive()
-        return sensors[..., :n] / SIZE
+        found: Array = sensors[..., :n] / SIZE
+        return found
 
     # --- inside ------------------------------------------------------------------------------
 

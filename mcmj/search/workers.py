@@ -126,11 +126,12 @@ class Cluster:
     @property
     def count(self) -> int:
         """Threads of all workers now: they may come and go."""
-        return max(1, sum(self._client.nthreads().values()))
+        return max(1, int(sum(self._client.nthreads().values())))
 
     def submit(self, task: Callable[..., T], *arguments: Any) -> Future[T]:
         """Run it somewhere."""
-        return self._pool.submit(task, *arguments)
+        found: Future[T] = self._pool.submit(task, *arguments)
+        return found
 
     def lost(self, error: BaseException) -> bool:
         """Dask gives up a task whose workers died several times."""

@@ -72,7 +72,7 @@ class Engine:
     @property
     def copies(self) -> int:
         """Number of simulations."""
-        return self._batch.nsim
+        return int(self._batch.nsim)
 
     def reset(self) -> None:
         """All copies back to the start, at rest, time 0."""
@@ -134,7 +134,8 @@ class Engine:
         lengths = self._batch.bind("sensordata")
         with quiet_warnings():
             self._batch.forward(stage=_POSITION_STAGE)
-        return lengths[:, -self.body.n_springs :].copy()
+        found: Array = lengths[:, -self.body.n_springs :].copy()
+        return found
 
     def _positions(self, qpos: Array) -> Array:
         """Node positions (..., N, 2) from joint positions (..., nq)."""

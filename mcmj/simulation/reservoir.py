@@ -102,7 +102,7 @@ class Reservoir:
         text.data = json.dumps({**json.loads(text.data), "w_out": kept})
         with quiet_warnings():
             spec.compile()
-            return spec.to_xml()
+            return str(spec.to_xml())
 
     @property
     def model(self) -> mujoco.MjModel:

@@ -263,7 +263,8 @@ class Simulation:
 
     def _public(self, array: Array) -> Array:
         """An engine's array as callers see it: one simulation has no axis of copies."""
-        return array[0]
+        found: Array = array[0]
+        return found
 
     def _chunks(
         self, drive: Drive, record: frozenset[str], hook: Hook | None, chunk: int

@@ -39,7 +39,8 @@ class FilterTask:
 def sines(steps: int, timestep: float) -> Array:
     """sin(2 pi f1 t) sin(2 pi f2 t) sin(2 pi f3 t), (T,), the toolbox's input."""
     times = np.arange(steps) * timestep
-    return np.prod([np.sin(2 * np.pi * f * times) for f in FREQUENCIES], axis=0)
+    found: Array = np.prod([np.sin(2 * np.pi * f * times) for f in FREQUENCIES], axis=0)
+    return found
 
 
 def smooth_noise(
@@ -48,7 +49,8 @@ def smooth_noise(
     """White noise through two first-order low-passes of that time [s]: (T, 1), of variance 1."""
     white = rng.standard_normal((steps + round(20 * time / timestep), 1))
     smooth = low_pass(low_pass(white, timestep, time), timestep, time)[-steps:]
-    return smooth / smooth.std()
+    found: Array = smooth / smooth.std()
+    return found
 
 
 def gaussian_kernel(timestep: float) -> Array:
@@ -57,7 +59,8 @@ def gaussian_kernel(timestep: float) -> Array:
     Its square is the toolbox's two-dimensional kernel: a sum over both arguments.
     """
     taus = np.arange(round(SUPPORT / timestep)) * timestep
-    return np.sqrt(timestep) * np.exp(-((taus - 0.1) ** 2) / (2 * 0.05**2))
+    found: Array = np.sqrt(timestep) * np.exp(-((taus - 0.1) ** 2) / (2 * 0.05**2))
+    return found
 
 
 def volterra(steps: int, timestep: float = 1e-3) -> FilterTask:
@@ -133,7 +136,8 @@ def switch(
 def low_pass(values: Array, timestep: float, time: float) -> Array:
     """z' = (values - z) / time, from 0, for values (T, n)."""
     keep = np.exp(-timestep / time)
-    return lfilter([1 - keep], [1, -keep], values, axis=0)
+    found: Array = lfilter([1 - keep], [1, -keep], values, axis=0)
+    return found
 
 
 def delays(inputs: Array, taps: int, spacing: int = 1) -> Array:
@@ -155,4 +159,5 @@ def _narma(u: Array, *, lag: int) -> Array:
 
 
 def _standard(values: Array) -> Array:
-    return ((values - values.mean()) / values.std())[:, None]
+    found: Array = ((values - values.mean()) / values.std())[:, None]
+    return found

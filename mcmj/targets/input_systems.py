@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from mcmj.targets.input_profiles import Profile
+from mcmj.targets.input_profiles import Profile, Ramp
 from mcmj.targets.limit_cycles import Target, integrate, quadratic, quadratic_flow
 from mcmj.utils.errors import InvalidArgumentError
 from mcmj.utils.validation import Array
@@ -44,10 +44,11 @@ class DrivenSystem:
             start = self.cycle(profile.ramps[0].start).sample([0.0])[0]
         pieces: list[Callable[[Array], Array]] = []
         for ramp in profile.ramps:
-            solution = integrate(
-                lambda t, x, u=ramp: self.flow(x, float(u(t))),
-                start, ramp.duration, dense_output=True,
-            )  # fmt: skip
+
+            def flow(t: float, x: Array, u: Ramp = ramp) -> Array:
+                return self.flow(x, float(u(t)))
+
+            solution = integrate(flow, start, ramp.duration, dense_output=True)
             pieces.append(solution.sol)
             start = solution.y[:, -1]
         return functools.partial(_sample, profile, pieces, len(start))

@@ -3,6 +3,7 @@
 import functools
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -44,7 +45,7 @@ class Target:
     @property
     def n_outputs(self) -> int:
         """Dimension of the signal."""
-        return self.curve(np.zeros(1)).shape[1]
+        return int(self.curve(np.zeros(1)).shape[1])
 
     def sample(self, times: npt.ArrayLike) -> Array:
         """y* (T, n_outputs) at times (T,) [s]."""
@@ -163,7 +164,9 @@ def target(name: str) -> Target:
     return TARGETS[name]()
 
 
-def integrate(rhs: Callable, start: Array, duration: float, **options):
+def integrate(
+    rhs: Callable[[float, Array], Array], start: Array, duration: float, **options: Any
+) -> Any:
     """solve_ivp's solution of x' = rhs(t, x) from x(0) by DOP853, as exact as targets are.
 
     Raises:

@@ -51,7 +51,8 @@ def strain_colours(strains: Array, largest: float) -> Array:
     share = np.abs(strains) / largest if largest > 0.0 else np.zeros_like(strains)
     weight = share[..., None] ** 0.25  # one very short spring must not make all others grey
     goal = np.where(strains[..., None] > 0, STRETCHED_COLOUR, SHORTENED_COLOUR)
-    return (1 - weight) * np.array(SPRING_COLOUR) + weight * goal
+    found: Array = (1 - weight) * np.array(SPRING_COLOUR) + weight * goal
+    return found
 
 
 def in_bytes(colour: Colour) -> tuple[int, int, int]:

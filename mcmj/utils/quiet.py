@@ -17,9 +17,8 @@ _depth = 0
 _before: object = None
 
 
-@ctypes.CFUNCTYPE(None, ctypes.c_char_p)
-def _ignore(message: bytes) -> None:
-    """Warning counters in mjData say the same, per simulation."""
+# warning counters in mjData say the same, per simulation
+_IGNORE = ctypes.CFUNCTYPE(None, ctypes.c_char_p)(lambda message: None)
 
 
 @contextmanager
@@ -29,7 +28,7 @@ def quiet_warnings() -> Iterator[None]:
     with _lock:
         if _depth == 0:
             _before = mujoco.get_mju_user_warning()
-            mujoco.set_mju_user_warning(_ignore)
+            mujoco.set_mju_user_warning(_IGNORE)
         _depth += 1
     try:
         yield

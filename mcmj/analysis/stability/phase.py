@@ -60,7 +60,8 @@ def fed_back_noise(
     values, vectors = np.linalg.eigh(weights.T @ weights)
     root = vectors * np.sqrt(np.maximum(values, 0.0)) @ vectors.T
     white = generator.standard_normal((len(deviations), steps, weights.shape[1]))
-    return deviations[:, None, None] * (white @ root)
+    found: Array = deviations[:, None, None] * (white @ root)
+    return found
 
 
 def phase_diffusion(
@@ -118,4 +119,5 @@ class _Phases:
         nearest = self._tree.query(scaled)[1]
         tangent = self._tangents[nearest]
         along = ((scaled - self._points[nearest]) * tangent).sum(axis=1)
-        return nearest * self._spacing + along / (tangent**2).sum(axis=1)
+        found: Array = nearest * self._spacing + along / (tangent**2).sum(axis=1)
+        return found

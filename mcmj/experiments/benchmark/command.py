@@ -6,8 +6,9 @@ from rich.console import Console
 from rich.table import Table
 
 from mcmj.experiments.base import Experiment, counting
+from mcmj.experiments.benchmark.config import Config
 from mcmj.experiments.benchmark.figure import figures
-from mcmj.experiments.benchmark.run import PARTS, Config, Result, run
+from mcmj.experiments.benchmark.run import PARTS, Result, run
 from mcmj.utils import files
 
 

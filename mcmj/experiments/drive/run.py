@@ -84,7 +84,8 @@ def _signal(config: Config, knots: Array) -> Array:
     """The input at every control step: linear between the knots, 0 at the end of the drive."""
     times = np.arange(round(config.time_limit / config.control_timestep)) * config.control_timestep
     at = np.linspace(0.0, config.drive, config.knots + 1)
-    return np.interp(times, at, [*knots, 0.0])
+    found: Array = np.interp(times, at, [*knots, 0.0])
+    return found
 
 
 def _play(environment: "Environment", signal: Array) -> Episode:

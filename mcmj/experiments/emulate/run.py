@@ -92,7 +92,8 @@ def reference(one: System, step_ms: float, horizon: float) -> Array:
     )
     if not solution.success:
         raise McmjError(f"the target system cannot be integrated: {solution.message}")
-    return solution.y.T
+    found: Array = solution.y.T
+    return found
 
 
 def emulation_error(states: Array, wanted: Array) -> float:

@@ -91,7 +91,7 @@ def single(
 def _generator() -> System:
     """The driven Duffing with u made by a second mass: no input, order 4."""
 
-    def g(x, v, out):
+    def g(x: Array, v: Array, out: Array) -> None:
         out[0] = x[0] - x[0] ** 3 - 0.3 * v[0] + x[1]
         out[1] = -(DRIVE_RATE**2) * x[1]
 

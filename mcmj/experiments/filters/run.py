@@ -101,4 +101,5 @@ def _parts(config: Config, *, sampled: bool) -> tuple[slice, slice]:
 def _run_readout(x: Array, y: Array, train: slice, test: slice) -> Array:
     """Outputs on the test part of a readout with a bias, fitted on the other."""
     w_out = fit_readout(x[train], y[train], bias=True)
-    return x[test] @ w_out[:-1] + w_out[-1]
+    found: Array = x[test] @ w_out[:-1] + w_out[-1]
+    return found

@@ -7,7 +7,8 @@ from rich.console import Console
 from mcmj.experiments.base import Experiment, counting, table_of
 from mcmj.experiments.input_driven.config import Config, total_steps
 from mcmj.experiments.input_driven.figure import figures
-from mcmj.experiments.input_driven.run import Result, run
+from mcmj.experiments.input_driven.result import Result
+from mcmj.experiments.input_driven.run import run
 from mcmj.mjcf.write import to_mjcf
 from mcmj.utils import files
 

@@ -18,8 +18,8 @@ from mcmj.experiments.input_driven.lessons import course_lesson, teach
 from mcmj.experiments.input_driven.result import BodyResult, Held, Outcome, Result
 from mcmj.experiments.input_driven.sweep import Sweep, branches
 from mcmj.learning.free_run import free_run
+from mcmj.learning.lessons import Lesson
 from mcmj.learning.practice import Practised
-from mcmj.learning.teaching import Lesson
 from mcmj.metrics import orbits
 from mcmj.simulation.simulation import Simulation
 from mcmj.targets.input_profiles import Profile, hold

@@ -27,7 +27,8 @@ class Branch:
 
     def at(self, name: str, inputs: Array) -> Array:
         """Amplitudes or frequencies, interpolated at inputs in the logarithm."""
-        return np.interp(np.log(inputs), np.log(self.inputs), getattr(self, name))
+        found: Array = np.interp(np.log(inputs), np.log(self.inputs), getattr(self, name))
+        return found
 
 
 @dataclass(frozen=True)

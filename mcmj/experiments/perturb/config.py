@@ -4,9 +4,9 @@ from dataclasses import dataclass, field, replace
 
 from mcmj.core.random_body import BodySettings
 from mcmj.experiments.body_source import BodySource
-from mcmj.learning.teaching import Teaching
+from mcmj.learning.lessons import Teaching
 from mcmj.metrics import orbits
-from mcmj.simulation.run_phases import Phase, RandomForces
+from mcmj.simulation.phases import Phase, RandomForces
 from mcmj.targets.named import named_target
 from mcmj.utils.validation import (
     require_duration,

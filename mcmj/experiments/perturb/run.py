@@ -10,7 +10,8 @@ from mcmj.experiments.perturb.config import Config
 from mcmj.experiments.perturb.result import LOST, BodyResult, Recovery, Result
 from mcmj.learning.teaching import teach
 from mcmj.metrics import orbits
-from mcmj.simulation.run_phases import Phase, Schedule, run_schedule
+from mcmj.simulation.phases import Phase, Schedule
+from mcmj.simulation.run_phases import run_schedule
 from mcmj.simulation.simulation import Simulation
 from mcmj.targets.limit_cycles import Target
 from mcmj.targets.named import named_target, require_outputs

@@ -53,7 +53,8 @@ def execute(
 def metrics_of(run: Run, folder: Path) -> dict[str, Any]:
     """The metrics that a finished run wrote."""
     document = json.loads((folder / run.name / "metrics.json").read_text(encoding="utf-8"))
-    return document["metrics"]
+    found: dict[str, Any] = document["metrics"]
+    return found
 
 
 def _account(run: Run, options: Sequence[str]) -> str:

@@ -7,9 +7,10 @@ from rich.console import Console
 from rich.table import Table
 
 from mcmj.experiments.base import Experiment
+from mcmj.experiments.search.config import Config
 from mcmj.experiments.search.figure import figures
-from mcmj.experiments.search.result import short
-from mcmj.experiments.search.run import Config, OnTrial, Result, run, total_trials
+from mcmj.experiments.search.result import Result, short
+from mcmj.experiments.search.run import OnTrial, run, total_trials
 from mcmj.metrics.success_rates import rate_cells
 from mcmj.search.database import TrialStore
 from mcmj.search.export import write_csv, write_parquet

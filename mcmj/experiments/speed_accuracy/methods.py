@@ -6,8 +6,9 @@ from mcmj.core.body import Body
 from mcmj.core.integrators import INTEGRATORS
 from mcmj.core.rollout_arguments import check_drive
 from mcmj.core.trajectory import State
-from mcmj.reference.integration import TWINS, integrate
+from mcmj.reference.integration import integrate
 from mcmj.reference.twin.population import Population
+from mcmj.reference.twin.stepping import METHODS as TWINS
 from mcmj.simulation.simulation import Simulation
 from mcmj.utils.errors import StabilityWarning
 from mcmj.utils.timing import Work

@@ -2,7 +2,8 @@
 
 from dataclasses import dataclass, replace
 
-from mcmj.experiments.limit_cycle import command as limit_cycle
+from mcmj.experiments.limit_cycle import config as limit_cycle
+from mcmj.experiments.limit_cycle.command import EXPERIMENT as LIMIT_CYCLE
 
 
 @dataclass(frozen=True)
@@ -17,4 +18,4 @@ class Config(limit_cycle.Config):
     measure_cost: bool = False
 
 
-EXPERIMENT = replace(limit_cycle.EXPERIMENT, name="success_rate", config=Config)
+EXPERIMENT = replace(LIMIT_CYCLE, name="success_rate", config=Config)

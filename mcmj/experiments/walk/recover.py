@@ -79,7 +79,8 @@ def _wander(outputs: Array) -> float:
 
 def distances_from(reference: Array, outputs: Array) -> Array:
     """Of outputs (T, n) from an orbit through samples (M, n), over its RMS radius."""
-    return cKDTree(reference).query(outputs)[0] / rms_radius(reference)
+    found: Array = cKDTree(reference).query(outputs)[0] / rms_radius(reference)
+    return found
 
 
 def recovery(away: Array, sample: float) -> float:

@@ -3,9 +3,10 @@
 Independent walks run side by side on threads; nothing depends on how many.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
+from typing import TypeVar
 
 import numpy as np
 
@@ -24,6 +25,8 @@ from mcmj.utils.timing import interleaved_seconds, median_ratio
 
 COST_STEPS = 4000
 COST_REPEATS = 7
+K = TypeVar("K")
+V = TypeVar("V")
 
 
 @dataclass(frozen=True)
@@ -68,7 +71,7 @@ def run(config: Config, *, on_steps: OnSteps = lambda steps: None) -> Result:
     return Result(config, lesson, walks, table)
 
 
-def _each(items: tuple, work: Callable, on_steps: OnSteps) -> dict:
+def _each(items: Sequence[K], work: Callable[[K, OnSteps], V], on_steps: OnSteps) -> dict[K, V]:
     return dict(zip(items, in_threads(work, items, on_steps), strict=True))
 
 
@@ -111,7 +114,10 @@ def switch(
     walker.set_gait(lesson.gaits[second])
     walk = walker.walk(config.after, sample=0.02)
     on_steps(round((config.before + config.moments * config.after) / walker.timestep))
-    return moments[np.isfinite(walk_metrics.fall_times(walk, config.robot.leg))].tolist()
+    found: list[float] = moments[
+        np.isfinite(walk_metrics.fall_times(walk, config.robot.leg))
+    ].tolist()
+    return found
 
 
 def push(lesson: Lesson, name: str, on_steps: OnSteps = lambda steps: None) -> dict[float, int]:

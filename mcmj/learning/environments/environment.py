@@ -48,7 +48,7 @@ class Physics(mujoco.Physics):
         readout = checked_readout(body, w_out)
         install.install(passive=setting.passive)
         xml = to_mjcf(body, timestep=setting.timestep, integrator=setting.integrator, w_out=readout)
-        physics = cls.from_xml_string(xml)
+        physics: Physics = cls.from_xml_string(xml)
         physics.model.actuator_biasprm[body.n_inputs :, 0] = setting.gate
         physics.body, physics.w_out = body, readout
         return physics
@@ -67,7 +67,8 @@ class Physics(mujoco.Physics):
 
     def lengths(self) -> Array:
         """Spring lengths (L,) now [m]."""
-        return self.data.sensordata[: self.body.n_springs].copy()
+        found: Array = self.data.sensordata[: self.body.n_springs].copy()
+        return found
 
     def outputs(self) -> Array:
         """What the readout says now (n_outputs,)."""

@@ -172,7 +172,8 @@ def _difference(function: Callable[[Array], Array], x: Array, secant: bool) -> A
     """Central difference: narrow about x, or from -x to x."""
     step = np.maximum(np.abs(x), _NUDGE) if secant else np.maximum(_NUDGE, _NUDGE * np.abs(x))
     middle = np.zeros_like(x) if secant else x
-    return (function(middle + step) - function(middle - step)) / (2 * step)
+    found: Array = (function(middle + step) - function(middle - step)) / (2 * step)
+    return found
 
 
 def _amplitudes(name: str, value: object, body: Body) -> Array:

@@ -97,14 +97,15 @@ def _read(file: h5py.File, name: str) -> Array | None:
         raise TrajectoryFileError(f"{file.filename}: {name} holds no numbers")
     if not _is_whole(place):  # HDF5 shows zeros there
         raise TrajectoryFileError(f"{file.filename}: parts of {name} are missing")
-    return place[()].astype(np.float64)
+    found: Array = place[()].astype(np.float64)
+    return found
 
 
 def _is_whole(dataset: h5py.Dataset) -> bool:
     if dataset.chunks is None:
-        return dataset.id.get_storage_size() >= dataset.nbytes
+        return bool(dataset.id.get_storage_size() >= dataset.nbytes)
     chunks = [-(-n // size) for n, size in zip(dataset.shape, dataset.chunks, strict=True)]
-    return dataset.id.get_num_chunks() >= math.prod(chunks)
+    return bool(dataset.id.get_num_chunks() >= math.prod(chunks))
 
 
 def _planar(array: Array) -> Array:
