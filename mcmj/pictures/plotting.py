@@ -63,7 +63,7 @@ def save(figure: Figure, path: str | Path) -> None:
         figure.savefig(temporary, dpi=130, format="png")
 
 
-def draw_body(axes: Axes, body: Body) -> None:
+def plot_body(axes: Axes, body: Body) -> None:
     """The network: springs, and nodes in the colours of their roles, with a legend."""
     lines = body.positions[body.springs]
     axes.add_collection(LineCollection(list(lines), colors="0.6", linewidths=1.0))

@@ -80,6 +80,7 @@ class Config(Searched):
     def __post_init__(self) -> None:
         for name in ("settings", "bodies", "judged"):
             require_count(name, getattr(self, name), 1, MAX_TRIALS)
+        require_count("settings x bodies", self.settings * self.bodies, 1, MAX_TRIALS)
         for name in ("startup", "first_seed", "judged_from", "draw_seed"):
             require_count(name, getattr(self, name), 0, MAX_SEED - MAX_TRIALS)
         if self.confirm is not None:
