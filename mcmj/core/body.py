@@ -48,7 +48,7 @@ class Body:
     d1: Array
     d3: Array
     rest_lengths: Array = None  # type: ignore[assignment]  # None becomes an array on construction
-    fixed: npt.NDArray[np.bool_] = None  # type: ignore[assignment]
+    fixed: npt.NDArray[np.bool_] = None  # type: ignore[assignment]  # so do these
     w_in: Array = None  # type: ignore[assignment]
     w_fb: Array = None  # type: ignore[assignment]
     masses: Array = None  # type: ignore[assignment]
@@ -89,7 +89,7 @@ class Body:
             np.array_equal(getattr(self, f.name), getattr(other, f.name)) for f in fields(self)
         )
 
-    __hash__ = None  # type: ignore[assignment]
+    __hash__ = None  # type: ignore[assignment]  # Python's way to say: not hashable
 
     def __reduce__(self) -> tuple[type["Body"], tuple[npt.NDArray[Any], ...]]:
         """Copies and what is unpickled come from the constructor: checked, and read-only."""

@@ -55,7 +55,7 @@ def check_drive(
     Raises:
         InvalidArgumentError: wrong shapes, lengths that disagree, NaN, or no length at all.
     """
-    constant = forces is not None and np.ndim(forces) == 1  # type: ignore[arg-type]
+    constant = forces is not None and np.asarray(forces).ndim == 1
     if constant:
         forces = as_array("forces", forces, (body.n_nodes,))[None]
     arrays = {
@@ -66,7 +66,7 @@ def check_drive(
     total = _common_length(steps, arrays, constant=constant)
     if gate is None:
         gate = np.full(body.n_outputs, float(closed))
-    elif np.ndim(gate) == 0:  # type: ignore[arg-type]
+    elif np.asarray(gate).ndim == 0:
         gate = np.full(body.n_outputs, gate)
     return Drive(steps=total, gate=as_array("gate", gate, (body.n_outputs,)), **arrays)
 
@@ -74,7 +74,7 @@ def check_drive(
 def _series(name: str, value: object, width: int, copies: int | None) -> Array | None:
     if value is None:
         return None
-    if copies is not None and np.ndim(value) == 3:  # type: ignore[arg-type]
+    if copies is not None and np.asarray(value).ndim == 3:
         return as_array(name, value, (copies, None, width))
     return as_array(name, value, (None, width))
 

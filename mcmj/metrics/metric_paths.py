@@ -1,6 +1,7 @@
 """Numbers of nested metrics by path: keys joined by "/", as in eps/0.2/orbit_error."""
 
 from collections.abc import Iterator, Mapping
+from typing import TypeGuard
 
 from mcmj.utils.errors import UnknownNameError
 
@@ -42,7 +43,7 @@ def _numbers(
 ) -> Iterator[tuple[str, float | None]]:
     if not keys:
         if _is_number(node):
-            yield "/".join(at), None if node is None else float(node)  # type: ignore[arg-type]
+            yield "/".join(at), None if node is None else float(node)
         return
     inside = _inside(node)
     for key in inside if keys[0] == ANY else keys[:1]:
@@ -58,7 +59,7 @@ def _paths(node: object, at: tuple[str, ...]) -> Iterator[str]:
         yield from _paths(item, (*at, ANY if isinstance(node, list) else key))
 
 
-def _is_number(node: object) -> bool:
+def _is_number(node: object) -> TypeGuard[float | None]:
     return node is None or (isinstance(node, int | float) and not isinstance(node, bool))
 
 

@@ -52,7 +52,7 @@ class FlatView:
         self._arrows.set_offsets(positions)
         self._arrows.set_UVC(arrows, np.zeros_like(arrows))
         self._figure.canvas.draw()
-        pixels = np.array(self._figure.canvas.buffer_rgba())  # type: ignore[attr-defined]
+        pixels = np.array(self._figure.canvas.buffer_rgba())  # type: ignore[attr-defined]  # Agg's
         return pixels[..., :3]
 
 

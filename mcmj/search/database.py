@@ -163,9 +163,9 @@ class TrialStore:
 
     # --- inside ------------------------------------------------------------------------------
 
-    def _decoded(self, key: str, *texts: object) -> list[dict[str, Any]]:
+    def _decoded(self, key: str, *texts: str) -> list[dict[str, Any]]:
         try:
-            found = [json.loads(text) for text in texts]  # type: ignore[arg-type]
+            found = [json.loads(text) for text in texts]
         except (TypeError, ValueError, RecursionError) as error:
             raise self._damaged(key, error) from error
         for document in found:

@@ -29,14 +29,14 @@ def override(config: C, changes: Mapping[str, object]) -> C:
     return _override(config, {full_path(config, p): v for p, v in changes.items()}, "")
 
 
-def value_at(config: object, path: str) -> object:
+def value_at(config: Any, path: str) -> object:
     """The value of a config's field, by its name or dotted path.
 
     Raises:
         UnknownNameError: no such field.
     """
     for name in full_path(config, path).split("."):
-        names = [f.name for f in dataclasses.fields(config)]  # type: ignore[arg-type]
+        names = [f.name for f in dataclasses.fields(config)]
         if name not in names:
             raise UnknownNameError(f"field of {type(config).__name__}", name, names)
         config = getattr(config, name)
@@ -125,13 +125,13 @@ def _override(config: C, changes: Mapping[str, object], at: str) -> C:
             path = f"{at}{name}.{next(iter(inner))}"
             raise InvalidArgumentError(path, f"no fields in {name}", part)
         own[name] = _override(part, inner, f"{at}{name}.")
-    return dataclasses.replace(config, **own) if own else config  # type: ignore[type-var]
+    return dataclasses.replace(config, **own) if own else config  # type: ignore[type-var]  # checked
 
 
 def _hints(config: object) -> dict[str, Any]:
     if not dataclasses.is_dataclass(config):
         raise InvalidArgumentError("config", "a dataclass", type(config).__name__)
-    return _hints_of(type(config))  # type: ignore[arg-type]
+    return _hints_of(type(config))  # type: ignore[arg-type]  # a class can be hashed
 
 
 @functools.cache

@@ -49,7 +49,7 @@ class Ensemble(Simulation):
 
     def _checked_readout(self, w_out: object) -> Array:
         one = isinstance(w_out, Readout) or is_pair(w_out)
-        if one or np.ndim(w_out) != 3:  # type: ignore[arg-type]
+        if one or np.asarray(w_out).ndim != 3:
             return super()._checked_readout(w_out)
         readouts = as_array("w_out", w_out, (self._copies, None, self.body.n_outputs))
         for readout in readouts[:1]:  # all have the same shape

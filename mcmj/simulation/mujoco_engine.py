@@ -115,7 +115,7 @@ class Engine:
             ("velocities", velocities, "qvel", 0.0),
         ):
             if value is not None:
-                lead = (self.copies,) if np.ndim(value) == 3 else ()  # type: ignore[arg-type]
+                lead = (self.copies,) if np.asarray(value).ndim == 3 else ()
                 array = as_array(name, value, (*lead, self.body.n_nodes, 2)) - origin
                 self._batch.bind(field)[:] = array[..., free, :].reshape(*lead, -1)
 

@@ -270,7 +270,7 @@ class Reservoir:
             if value is not None
         }
         total = _common_length(steps, arrays)
-        if gate is None or np.ndim(gate) == 0:  # type: ignore[arg-type]
+        if gate is None or np.asarray(gate).ndim == 0:
             gate = np.full(self.n_outputs, self._w_out is not None if gate is None else gate)
         gates = as_array("gate", gate, (self.n_outputs,))
         return self._chunks(total, arrays, gates, frozenset(record), chunk)

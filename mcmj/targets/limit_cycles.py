@@ -88,7 +88,7 @@ def limit_cycle(
     def section(t: float, x: Array) -> float:
         return float((x - origin) @ flow)
 
-    section.direction = 1  # type: ignore[attr-defined]
+    section.direction = 1  # type: ignore[attr-defined]  # solve_ivp's way
     solution = integrate(rhs, origin, longest_period, events=section, dense_output=True)
     size = np.ptp(solution.y, axis=1).max()
     returns = [

@@ -82,7 +82,8 @@ class Checkpoint:
         running.update(new)
         kept = {"account": np.array(self._account), "steps": np.array(rows), **arrays}
         with files.whole_file(self._state) as temporary, temporary.open("wb") as target:
-            np.savez(target, digest=np.array(_digest(running, kept)), **kept)  # type: ignore[arg-type]
+            digest = np.array(_digest(running, kept))
+            np.savez(target, digest=digest, **kept)  # type: ignore[arg-type]  # no option's name
         self._rows, self._hash = rows, running
 
     def remove(self) -> None:

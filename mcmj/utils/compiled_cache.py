@@ -45,7 +45,7 @@ def ensure_cache() -> None:
 
 def _trouble() -> str | None:
     """What is wrong with Numba's cache, None if nothing is."""
-    if numba.config.DISABLE_JIT:  # type: ignore[attr-defined]
+    if numba.config.DISABLE_JIT:  # type: ignore[attr-defined]  # Numba makes it late
         return None
     try:
         cache = numba.njit(cache=True)(_trouble).stats.cache_path or ""

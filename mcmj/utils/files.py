@@ -20,7 +20,7 @@ from mcmj.utils.errors import InvalidArgumentError, OutputError
 try:
     import fcntl
 except ImportError:  # not a Unix
-    fcntl = None  # type: ignore[assignment]
+    fcntl = None  # type: ignore[assignment]  # a module elsewhere
 
 _LOCKED: ContextVar[frozenset[Path]] = ContextVar("_LOCKED", default=frozenset())
 _PACKAGES = ("mcmj", "mujoco", "numpy", "scipy", "numba")

@@ -27,7 +27,7 @@ def as_array(name: str, value: object, shape: Sequence[int | None]) -> Array:
     """
     wanted = "(" + ", ".join("any" if n is None else str(n) for n in shape) + ")"
     try:
-        if np.iscomplexobj(value):  # type: ignore[arg-type]
+        if np.iscomplexobj(np.asarray(value)):
             raise TypeError("complex")
         array = np.array(value, dtype=np.float64, order="C", copy=None)
     except (TypeError, ValueError) as error:

@@ -32,7 +32,7 @@ class CoupledLaw(SpringLaw):
             parameters (L, 4) the springs' k1, k3, d1, d3; writes the pulls to out (L,).
     """
 
-    pull: CoupledPull  # type: ignore[assignment]
+    pull: CoupledPull  # type: ignore[assignment]  # of all springs, not of one
 
     @property
     def tag(self) -> float:

@@ -4,6 +4,7 @@ import os
 import platform
 import subprocess
 import sys
+from functools import partial
 
 import numpy as np
 
@@ -31,7 +32,7 @@ def start_up(config: Config, body: Body) -> dict[str, object]:
     }
     seconds = interleaved_seconds(
         {
-            name: lambda code=code: subprocess.run([sys.executable, "-c", code], check=True)  # type: ignore[misc]
+            name: partial(subprocess.run, [sys.executable, "-c", code], check=True)
             for name, code in {"empty": "pass", **snippets}.items()
         },
         repeats=3,

@@ -2,6 +2,8 @@
 
 import time
 from dataclasses import dataclass, replace
+from functools import partial
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -63,10 +65,10 @@ def loop_costs(config: Config, body: Body) -> dict[str, object]:
         # tansig springs of slope k1 k3, d1 d3 would be too stiff with the cubic's parameters
         soft = replace(body, k3=body.k3 / 100, d3=body.d3 / 100)
         simulation = Simulation(soft, w_out=w_out, springs=springs)
-        works[f"{springs}_hook"] = lambda s=simulation: s.rollout(steps)  # type: ignore[misc]
+        works[f"{springs}_hook"] = partial(simulation.rollout, steps)
     for integrator in (name for name in INTEGRATORS if name != DEFAULT_INTEGRATOR):
         simulation = Simulation(body, w_out=w_out, integrator=integrator)
-        works[integrator] = lambda s=simulation: s.rollout(steps)  # type: ignore[misc]
+        works[integrator] = partial(simulation.rollout, steps)
     seconds = interleaved_seconds(works, config.repeats)
     seconds["python_hook"] = [s * steps / python_steps for s in seconds["python_hook"]]
     ns = float(np.median(seconds["closed"])) / (steps * body.n_springs) * 1e9
@@ -125,7 +127,7 @@ def thread_speedups(config: Config, body: Body) -> dict[str, object]:
     twins = {n: _population(others, threads=n) for n in (1, 2)}
     works: dict[str, Work] = {}
     for n in (1, 2):
-        works[f"mujoco{n}"] = lambda e=ensembles[n]: e.rollout(steps, record=())  # type: ignore[misc]
+        works[f"mujoco{n}"] = partial(ensembles[n].rollout, steps, record=())
         works[f"twin{n}"] = _twin_work(twins[n], steps, lengths=False)
     seconds = interleaved_seconds(works, config.repeats)
     return {
@@ -140,7 +142,7 @@ def scene_costs(config: Config, body: Body) -> dict[str, object]:
     works: dict[str, Work] = {}
     for name, model in (("minimal", minimal), ("full", full_scene(body))):
         data = mujoco.MjData(model)
-        works[name] = lambda m=model, d=data: mujoco.mj_step(m, d, nstep=config.steps // 4)  # type: ignore[misc]
+        works[name] = partial(mujoco.mj_step, model, data, nstep=config.steps // 4)
     seconds = interleaved_seconds(works, config.repeats)
     return {"full_scene_ratio": median_ratio(seconds, "full", "minimal")}
 
@@ -156,7 +158,7 @@ def growth(config: Config, body: Body) -> dict[str, object]:
         steps = max(10, config.steps * 30 // nodes // 2)
         seconds = interleaved_seconds(
             {
-                "mujoco": lambda s=simulation, n=steps: s.rollout(n),  # type: ignore[misc]
+                "mujoco": partial(simulation.rollout, steps),
                 "twin": _twin_work(_population([other]), steps),
             },
             min(config.repeats, 5),
@@ -177,9 +179,9 @@ def growth(config: Config, body: Body) -> dict[str, object]:
 PARTS = (loop_costs, twin_costs, thread_speedups, scene_costs, start_up, growth, memory)
 
 
-def _population(bodies: list[Body], **options: object) -> Population:
+def _population(bodies: list[Body], **options: Any) -> Population:
     readouts = [small_readout(body) for body in bodies]
-    return Population(bodies, readouts, method="semi_implicit_euler", **options)  # type: ignore[arg-type]
+    return Population(bodies, readouts, method="semi_implicit_euler", **options)
 
 
 def _twin_work(population: Population, steps: int, *, lengths: bool = True) -> Work:

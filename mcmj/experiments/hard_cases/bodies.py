@@ -92,12 +92,12 @@ def nearly_collinear(seed: int) -> HardCase:
 def through_zero_length(seed: int) -> HardCase:
     """A mass on a line between two fixed nodes, pushed through one of them and back."""
     body = Body(
-        positions=[[0.0, 0.0], [1.0, 0.0], [3.0, 0.0]],  # type: ignore[arg-type]
-        springs=[[0, 1], [1, 2]],  # type: ignore[arg-type]
-        k1=[10.0, 10.0],  # type: ignore[arg-type]
-        k3=[0.0, 0.0],  # type: ignore[arg-type]
-        d1=[0.3, 0.3],  # type: ignore[arg-type]
-        d3=[0.0, 0.0],  # type: ignore[arg-type]
+        positions=np.array([[0.0, 0.0], [1.0, 0.0], [3.0, 0.0]]),
+        springs=np.array([[0, 1], [1, 2]]),
+        k1=np.array([10.0, 10.0]),
+        k3=np.array([0.0, 0.0]),
+        d1=np.array([0.3, 0.3]),
+        d3=np.array([0.0, 0.0]),
     )
     return HardCase(body, np.zeros((3, 2)), np.array([0.0, -40.0, 0.0]))
 

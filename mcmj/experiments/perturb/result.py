@@ -85,9 +85,9 @@ class Result:
                           for k in range(len(config.noise_curve))],
         }  # fmt: skip
         if config.seeds > 1:
-            table["seeds"] = {name: self.over_seeds(name) for name in first.recoveries}
+            rows = {name: self.over_seeds(name) for name in first.recoveries}
             errors = [body.unperturbed_error for body in self.bodies]
-            table["seeds"]["unperturbed"] = self._count(errors)  # type: ignore[index]
+            table["seeds"] = rows | {"unperturbed": self._count(errors)}
         return table
 
     def over_seeds(self, name: str) -> dict[str, object]:

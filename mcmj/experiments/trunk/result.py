@@ -1,6 +1,7 @@
 """How the robots walk: a gait of one robot, tables over gaits and seeds."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -35,10 +36,10 @@ class Gait:
     learned: Learned | None
     walk: Walk | None
 
-    def walker(self, **options: object) -> TrunkWalker:
+    def walker(self, **options: Any) -> TrunkWalker:
         """The robot in this gait, in closed loop."""
         assert self.learned is not None
-        walker = TrunkWalker(self.trunk, **options)  # type: ignore[arg-type]
+        walker = TrunkWalker(self.trunk, **options)
         walker.set_readout(self.learned.w_out)
         walker.close(True)
         walker.restore(self.learned.state)

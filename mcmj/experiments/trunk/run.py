@@ -38,7 +38,7 @@ def run(config: Config, *, on_steps: OnSteps = lambda steps: None) -> Result:
         rows = in_threads(partial(RUNS[part], config, good), tuple(good), on_steps)
         table[part] = dict(zip(good, rows, strict=True))
     if "push" in config.parts:
-        table["push"] = push_summary(config, table["push"])  # type: ignore[arg-type]
+        table["push"] = push_summary(config, table["push"])  # type: ignore[arg-type]  # of RUNS
     return Result(config, gaits, table)
 
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
@@ -38,11 +39,11 @@ class Lesson:
     grounded: dict[str, LegReadout] = field(default_factory=dict)
     fits: Table = field(default_factory=dict)
 
-    def walker(self, **options: object) -> Walker:
+    def walker(self, **options: Any) -> Walker:
         """A new robot with the config's settings."""
         config = self.config
-        given = {"timestep": config.timestep / config.pace, "pace": config.pace} | options
-        return Walker(self.body, config.robot, **given)  # type: ignore[arg-type]
+        given = {"timestep": config.timestep / config.pace, "pace": config.pace}
+        return Walker(self.body, config.robot, **{**given, **options})
 
     def period(self, gait: str) -> float:
         """Of a gait at the robot's pace [s]."""

@@ -45,8 +45,8 @@ class TwinEngine:
 
     def set_readout(self, w_out: Array | None) -> None:
         """Readouts (rows, n_outputs) for all copies, or (copies, rows, n_outputs)."""
-        shared = w_out is None or w_out.ndim == 2
-        self._population.set_readouts([w_out] * self.copies if shared else list(w_out))  # type: ignore[arg-type]
+        one_each = [w_out] * self.copies if w_out is None or w_out.ndim == 2 else list(w_out)
+        self._population.set_readouts(one_each)
 
     @property
     def state(self) -> State:
@@ -64,7 +64,7 @@ class TwinEngine:
         arrays = {"positions": now.positions, "velocities": now.velocities}
         for name, value in (("positions", positions), ("velocities", velocities)):
             if value is not None:
-                lead = (self.copies,) if np.ndim(value) == 3 else ()  # type: ignore[arg-type]
+                lead = (self.copies,) if np.asarray(value).ndim == 3 else ()
                 given = as_array(name, value, (*lead, self.body.n_nodes, 2))
                 arrays[name] = np.where(self.body.fixed[:, None], arrays[name], given)
         pairs = zip(arrays["positions"], arrays["velocities"], strict=True)

@@ -177,7 +177,8 @@ def _difference(function: Callable[[Array], Array], x: Array, secant: bool) -> A
 
 
 def _amplitudes(name: str, value: object, body: Body) -> Array:
-    values = np.broadcast_to(np.asarray(value), (body.n_springs,)) if np.ndim(value) == 0 else value  # type: ignore[arg-type]
+    given = np.asarray(value)
+    values = np.broadcast_to(given, (body.n_springs,)) if given.ndim == 0 else given
     array = as_array(name, values, (body.n_springs,))
     require_above(name, array, 0.0, strict=False)
     return array
@@ -211,7 +212,8 @@ def _feedback(body: Body, along: csr_array, w_out: object, gate: object) -> csr_
     if w_out is None or body.n_outputs == 0:
         return csr_array((n, n))
     weights = Readout.of(w_out, body.n_springs, body.n_outputs).weights
-    gates = as_array("gate", np.broadcast_to(gate, (body.n_outputs,)), (body.n_outputs,))  # type: ignore[call-overload]
+    shape = (body.n_outputs,)
+    gates = as_array("gate", np.broadcast_to(np.asarray(gate), shape), shape)
     push = np.zeros((n, body.n_outputs))
     push[::2] = body.w_fb[body.free] * gates
     return csr_array(-push @ (along.T @ weights).T)

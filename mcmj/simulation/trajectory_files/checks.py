@@ -48,7 +48,7 @@ def checked_trajectory(times: object, recorded: Mapping[str, object]) -> Traject
     for name in RECORDABLE:
         if name in recorded:
             axes = -TIME_AXIS[name]  # without that of an ensemble's copies
-            lead = (None,) if np.ndim(recorded[name]) > axes else ()  # type: ignore[arg-type]
+            lead = (None,) if np.asarray(recorded[name]).ndim > axes else ()
             rest = (None,) if axes == 2 else (None, 2)
             arrays[name] = _numbers(name, recorded[name], (*lead, len(instants), *rest))
             copies.add(arrays[name].shape[:-axes])
