@@ -20,7 +20,7 @@ _RENEW = LEASE / 6
 
 
 @dataclass
-class Run:
+class SearchRun:
     """What became of all trials.
 
     Attributes:
@@ -40,7 +40,7 @@ def run_trials(
     workers: Workers,
     *,
     on_outcome: OnOutcome = lambda trial, outcome: None,
-) -> Run:
+) -> SearchRun:
     """Outcomes of all trials: from the store, from workers, or from another search at work.
 
     Args:
@@ -64,9 +64,9 @@ class _Runner:
         self._flying: dict[Future[Outcome], str] = {}
         self._deaths = 0
         self._renewed = self._polled = time.monotonic()
-        self._result = Run()
+        self._result = SearchRun()
 
-    def run(self) -> Run:
+    def run(self) -> SearchRun:
         self._take_finished(list(self._waiting))
         begin = time.perf_counter()
         try:

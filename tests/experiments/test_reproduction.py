@@ -8,7 +8,7 @@ import sys
 import numpy as np
 import pytest
 
-from mcmj.experiments.reproduce.claims import Claim, Run, chosen, judge
+from mcmj.experiments.reproduce.claims import Claim, Command, chosen, judge
 from mcmj.experiments.reproduce.page import page
 from mcmj.experiments.reproduce.paper import PARTS
 from mcmj.experiments.reproduce.runner import execute, finished, metrics_of
@@ -65,7 +65,7 @@ def test_parts_are_chosen_by_name():
 def test_a_finished_command_is_not_run_again_and_a_failed_one_is(tmp_path):
     (tmp_path / "script.py").write_text(SCRIPT)
     program = (sys.executable, str(tmp_path / "script.py"))
-    run, out = Run("one", "script", (), ()), tmp_path / "out"
+    run, out = Command("one", "script", (), ()), tmp_path / "out"
     assert not finished(run, (), out)
     execute(run, (), out, program)
     assert finished(run, (), out)
@@ -118,7 +118,7 @@ def test_a_browser_shows_the_page_with_its_pictures(document, tmp_path):
 
 
 def test_an_account_of_another_version_is_not_taken(tmp_path):
-    run = Run("one", "script", (), ())
+    run = Command("one", "script", (), ())
     (tmp_path / "one").mkdir()
     write_metrics(tmp_path / "one" / "metrics.json", "script", {}, 0, {})
     (tmp_path / "one" / "account.json").write_text("{}")

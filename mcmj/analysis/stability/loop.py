@@ -23,7 +23,7 @@ METHOD = "semi_implicit_euler"
 
 
 @dataclass(frozen=True)
-class Run:
+class LoopRun:
     """What became of B copies.
 
     Attributes:
@@ -100,7 +100,7 @@ class ClosedLoop:
         offset: object = None,
         forces: object = None,
         gate: object = None,
-    ) -> Run:
+    ) -> LoopRun:
         """Advance copies (B, n) by T steps; offset, forces and gate as for Ensemble.rollout.
 
         Copies that blow up are reported in `alive`, not raised.
@@ -116,7 +116,7 @@ class ClosedLoop:
         )  # fmt: skip
         population = self._population(start)
         record, done = population.run(drive, 0, drive.steps, lengths=False)
-        return Run(self._vectors(population), record.outputs, done == drive.steps)
+        return LoopRun(self._vectors(population), record.outputs, done == drive.steps)
 
     def trail(self, state: Array, stride: int, samples: int) -> Array:
         """States (samples, n) every `stride` steps of the undisturbed run from a state (n,)."""

@@ -18,7 +18,7 @@ KINDS = ("free_run", "switch", "from_rest", "all")  # what a body may succeed in
 
 
 @dataclass(frozen=True)
-class Run:
+class GaitRun:
     """Outputs in one gait, and how far they are from it at the end.
 
     Attributes:
@@ -54,8 +54,8 @@ class Taught:
     target: Target
     w_out: Array | None
     fit: Fit | None
-    free: Run
-    from_rest: Run
+    free: GaitRun
+    from_rest: GaitRun
 
 
 @dataclass(frozen=True)
@@ -65,7 +65,7 @@ class BodyResult:
     body: Body
     source: dict[str, object]
     gaits: dict[str, Taught]
-    switches: dict[tuple[str, str], Run]
+    switches: dict[tuple[str, str], GaitRun]
 
     @property
     def metrics(self) -> dict[str, object]:
@@ -162,7 +162,7 @@ def outcome(result: BodyResult, seed: int, tolerance: float) -> dict[str, object
     }
 
 
-def measure(config: Config, outputs: Array, wanted: Target, *, switched: int = 0) -> Run:
+def measure(config: Config, outputs: Array, wanted: Target, *, switched: int = 0) -> GaitRun:
     """Outputs with their errors at the end, and the time that they took to the gait."""
     step = config.timestep
     duties = lags = np.full(len(LEGS), np.nan)
@@ -183,4 +183,4 @@ def measure(config: Config, outputs: Array, wanted: Target, *, switched: int = 0
         "phase_lag_error": gaitmetrics.phase_lag_error(lags, wanted),
         "duty_factor_error": gaitmetrics.duty_factor_error(duties, wanted),
     }
-    return Run(outputs, errors, time, duties, lags, switched)
+    return GaitRun(outputs, errors, time, duties, lags, switched)

@@ -9,7 +9,7 @@ from mcmj.core.body import Body
 from mcmj.core.readout import checked_readout
 from mcmj.experiments.blow_ups import or_lost
 from mcmj.experiments.gaits.config import Config, check, get_body
-from mcmj.experiments.gaits.result import BodyResult, Result, Run, Taught, measure, outcome
+from mcmj.experiments.gaits.result import BodyResult, GaitRun, Result, Taught, measure, outcome
 from mcmj.learning.free_run import free_run
 from mcmj.learning.practice import practise
 from mcmj.learning.regression import Fit
@@ -149,7 +149,7 @@ def _run_gait(config: Config, simulation: Simulation, learnt: _Learnt, on_steps:
         lost = measure(config, LOST, wanted)
         return Taught(wanted, None, None, lost, lost)
 
-    def run_free(seconds: float) -> Run:
+    def run_free(seconds: float) -> GaitRun:
         steps = round(seconds / config.timestep)
         found = or_lost(lambda: free_run(simulation, steps, on_steps=on_steps), LOST)
         return measure(config, found, wanted)
@@ -163,7 +163,7 @@ def _run_gait(config: Config, simulation: Simulation, learnt: _Learnt, on_steps:
 
 def _switch(
     config: Config, simulation: Simulation, first: Taught, second: Taught, on_steps: OnSteps
-) -> Run:
+) -> GaitRun:
     """Go on in one gait, then replace its readout by another's, at once."""
     phases = [Phase(config.before, w_out=first.w_out), Phase(config.after, w_out=second.w_out)]
     run = None

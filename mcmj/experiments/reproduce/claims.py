@@ -18,7 +18,7 @@ FORMATS = {"error": "{:.2%}", "time": "{:.1f} s", "ratio": "{:.3f}"}
 
 
 @dataclass(frozen=True)
-class Run:
+class Command:
     """One command.
 
     Attributes:
@@ -63,7 +63,7 @@ class Part:
 
     name: str
     title: str
-    runs: tuple[Run, ...]
+    runs: tuple[Command, ...]
     claims: tuple[Claim, ...]
 
 

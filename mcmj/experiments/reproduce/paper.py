@@ -1,6 +1,6 @@
 """The claims of the paper, figure by figure, and the commands that show them."""
 
-from mcmj.experiments.reproduce.claims import Claim, Part, Run
+from mcmj.experiments.reproduce.claims import Claim, Command, Part
 from mcmj.targets.gaits import GAITS
 from mcmj.targets.limit_cycles import TARGETS
 
@@ -23,8 +23,8 @@ FIG5 = Part(
     "fig5",
     "Fig. 5: limit cycles, one body, three readouts",
     (
-        Run("limit_cycle", "limit_cycle", (), ("--free-run", "60", "--no-video")),
-        Run("success_rate", "success_rate", ("--seeds", "50"), ("--seeds", "3")),
+        Command("limit_cycle", "limit_cycle", (), ("--free-run", "60", "--no-video")),
+        Command("success_rate", "success_rate", ("--seeds", "50"), ("--seeds", "3")),
     ),
     (
         *_of_tasks("the general body generates {}", "limit_cycle", "{}/orbit_error"),
@@ -35,7 +35,7 @@ LONG = Part(
     "long_run",
     "Section 6.1: a million steps",
     (
-        Run("long_run", "limit_cycle", ("--free-run", "1000", "--no-video"), None),
+        Command("long_run", "limit_cycle", ("--free-run", "1000", "--no-video"), None),
     ),
     tuple(
         Claim(
@@ -56,7 +56,7 @@ FIG6 = Part(
     "fig6",
     "Fig. 6: disturbed for 10 s",
     (
-        Run(
+        Command(
             "perturb", "perturb",
             ("--engine", "twin", "--seeds", "20"), ("--engine", "twin", "--seeds", "5"),
         ),
@@ -77,7 +77,7 @@ FIG7 = Part(
     "fig7",
     "Fig. 7: swinging up from total rest",
     (
-        Run(
+        Command(
             "swing_up", "swing_up",
             ("--engine", "twin", "--seeds", "50"),
             ("--engine", "twin", "--seeds", "3", "--kicks", "0"),
@@ -88,8 +88,8 @@ FIG7 = Part(
     ),
 )  # fmt: skip
 GAIT_RUNS = (
-    Run("gaits", "gaits", (), ("--engine", "twin")),
-    Run("gait_seeds", "gaits", ("--engine", "twin", "--seeds", "20"), None),
+    Command("gaits", "gaits", (), ("--engine", "twin")),
+    Command("gait_seeds", "gaits", ("--engine", "twin", "--seeds", "20"), None),
 )
 FIG8 = Part(
     "fig8",
@@ -114,12 +114,12 @@ FIG10 = Part(
     "fig10",
     "Figs. 10 and 11: the input chooses the rhythm",
     (
-        Run(
+        Command(
             "input_driven", "input_driven",
             ("--body", "input_driven"),
             ("--body", "input_driven", "--engine", "twin", "--sweep", "0"),
         ),
-        Run("input_seeds", "input_driven", ("--engine", "twin", "--seeds", "20"), None),
+        Command("input_seeds", "input_driven", ("--engine", "twin", "--seeds", "20"), None),
     ),
     (
         *(
@@ -137,8 +137,8 @@ ACCURACY = Part(
     "speed_accuracy",
     "Speed against error: what the physics is worth",
     (
-        Run("speed_accuracy", "speed_accuracy", (), None),
-        Run("certify", "certify", (), None),
+        Command("speed_accuracy", "speed_accuracy", (), None),
+        Command("certify", "certify", (), None),
     ),
     (
         Claim("the cycle is stable: leading nontrivial Floquet multiplier", "not given", "certify",

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from mcmj.experiments.reproduce.claims import Outcome, Part, Run, chosen, judge
+from mcmj.experiments.reproduce.claims import Command, Outcome, Part, chosen, judge
 from mcmj.experiments.reproduce.paper import PARTS
 from mcmj.experiments.reproduce.runner import execute, finished, metrics_of, options_of
 from mcmj.utils.errors import McmjError
@@ -30,7 +30,7 @@ class Config:
         """The parts of the paper that are asked for."""
         return chosen(PARTS, [ALIASES.get(name, name) for name in self.only])
 
-    def runs(self, part: Part) -> list[tuple[Run, tuple[str, ...]]]:
+    def runs(self, part: Part) -> list[tuple[Command, tuple[str, ...]]]:
         """The runs of a part in this mode, with their options."""
         pairs = [(run, options_of(run, quick=self.quick)) for run in part.runs]
         return [(run, options) for run, options in pairs if options is not None]

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from mcmj.experiments.reproduce.claims import Run
+from mcmj.experiments.reproduce.claims import Command
 from mcmj.utils import files
 from mcmj.utils.errors import McmjError
 
@@ -16,12 +16,12 @@ ACCOUNT = "account.json"
 PROGRAM = (sys.executable, "-m", "mcmj")
 
 
-def options_of(run: Run, *, quick: bool) -> tuple[str, ...] | None:
+def options_of(run: Command, *, quick: bool) -> tuple[str, ...] | None:
     """Its options in that mode; None if it is not run."""
     return run.quick if quick else run.full
 
 
-def finished(run: Run, options: Sequence[str], folder: Path) -> bool:
+def finished(run: Command, options: Sequence[str], folder: Path) -> bool:
     """Whether this very command, with these versions, has been run there to the end."""
     try:
         return (folder / run.name / ACCOUNT).read_text(encoding="utf-8") == _account(run, options)
@@ -30,7 +30,7 @@ def finished(run: Run, options: Sequence[str], folder: Path) -> bool:
 
 
 def execute(
-    run: Run, options: Sequence[str], folder: Path, program: Sequence[str] = PROGRAM
+    run: Command, options: Sequence[str], folder: Path, program: Sequence[str] = PROGRAM
 ) -> None:
     """Run a command into folder/<name>; what was there before is removed.
 
@@ -50,12 +50,12 @@ def execute(
     files.write_text(out / ACCOUNT, _account(run, options))
 
 
-def metrics_of(run: Run, folder: Path) -> dict[str, Any]:
+def metrics_of(run: Command, folder: Path) -> dict[str, Any]:
     """The metrics that a finished run wrote."""
     document = json.loads((folder / run.name / "metrics.json").read_text(encoding="utf-8"))
     found: dict[str, Any] = document["metrics"]
     return found
 
 
-def _account(run: Run, options: Sequence[str]) -> str:
+def _account(run: Command, options: Sequence[str]) -> str:
     return json.dumps({"script": run.script, "options": options, "versions": files.versions()})

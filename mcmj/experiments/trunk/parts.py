@@ -6,7 +6,7 @@ import numpy as np
 
 from mcmj.experiments.blow_ups import or_lost
 from mcmj.experiments.trunk.config import Config
-from mcmj.experiments.trunk.result import Gait, Table, fell, forward_speed
+from mcmj.experiments.trunk.result import LearnedGait, Table, fell, forward_speed
 from mcmj.metrics import orbits as metrics
 from mcmj.robots.force_learning import learn_by_regression, trial_error
 from mcmj.robots.trunk_walker import TIMESTEP, TrunkWalker
@@ -15,7 +15,9 @@ from mcmj.utils.progress import OnSteps
 from mcmj.utils.validation import Array
 
 
-def by_regression(config: Config, gaits: dict[str, Gait], name: str, on_steps: OnSteps) -> Table:
+def by_regression(
+    config: Config, gaits: dict[str, LearnedGait], name: str, on_steps: OnSteps
+) -> Table:
     """Orbit error of a free run after plain regression, infinite if the robot falls."""
     gait = gaits[name]
     walker = TrunkWalker(gait.trunk)
@@ -30,7 +32,7 @@ def by_regression(config: Config, gaits: dict[str, Gait], name: str, on_steps: O
     return {"train_nrmse": fit.train_nrmse, "orbit_error": error}
 
 
-def from_rest(config: Config, gaits: dict[str, Gait], name: str, on_steps: OnSteps) -> Table:
+def from_rest(config: Config, gaits: dict[str, LearnedGait], name: str, on_steps: OnSteps) -> Table:
     """The loop is closed while the robot stands: does it start by itself?"""
     gait = gaits[name]
     walker = gait.walker()
@@ -41,7 +43,9 @@ def from_rest(config: Config, gaits: dict[str, Gait], name: str, on_steps: OnSte
     return table
 
 
-def push(config: Config, gaits: dict[str, Gait], name: str, on_steps: OnSteps) -> dict[float, int]:
+def push(
+    config: Config, gaits: dict[str, LearnedGait], name: str, on_steps: OnSteps
+) -> dict[float, int]:
     """How many pushes of each size, both ways at every moment, do not end in a fall."""
     gait = gaits[name]
     walker = gait.walker()
@@ -61,7 +65,7 @@ def push(config: Config, gaits: dict[str, Gait], name: str, on_steps: OnSteps) -
     return survived
 
 
-def switch(config: Config, gaits: dict[str, Gait], name: str, on_steps: OnSteps) -> Table:
+def switch(config: Config, gaits: dict[str, LearnedGait], name: str, on_steps: OnSteps) -> Table:
     """The readout is replaced by every other gait's while the robot walks."""
     table: Table = {}
     for other in gaits:
@@ -75,7 +79,9 @@ def switch(config: Config, gaits: dict[str, Gait], name: str, on_steps: OnSteps)
     return table
 
 
-def step_study(config: Config, gaits: dict[str, Gait], name: str, on_steps: OnSteps) -> Table:
+def step_study(
+    config: Config, gaits: dict[str, LearnedGait], name: str, on_steps: OnSteps
+) -> Table:
     """Speed and orbit error of the same readout at other time steps [ms]."""
     table: Table = {}
     for step in config.steps_ms:
@@ -95,7 +101,7 @@ def push_summary(config: Config, survived: dict[str, dict[float, int]]) -> Table
 
 
 def _end_of(
-    config: Config, gait: Gait, walker: TrunkWalker, duration: float, *, push: float = 0.0
+    config: Config, gait: LearnedGait, walker: TrunkWalker, duration: float, *, push: float = 0.0
 ) -> Table:
     """How a walk from now on ends: its last part, half of it at most."""
     walk = or_lost(lambda: walker.walk(duration, push=push), None)
@@ -106,7 +112,7 @@ def _end_of(
     return {"falls": 0, "speed_m_s": forward_speed(last), "orbit_error": error}
 
 
-RUNS: dict[str, Callable[[Config, dict[str, Gait], str, OnSteps], object]] = {
+RUNS: dict[str, Callable[[Config, dict[str, LearnedGait], str, OnSteps], object]] = {
     "regression": by_regression,
     "rest": from_rest,
     "push": push,

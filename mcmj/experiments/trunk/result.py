@@ -28,7 +28,7 @@ TAUGHT = 0.1  # orbit error below which a gait counts as the one that was taught
 
 
 @dataclass(frozen=True)
-class Gait:
+class LearnedGait:
     """One robot that has learned one gait, and its walk; the readout is None if it blew up."""
 
     trunk: Trunk
@@ -51,11 +51,11 @@ class Result:
     """Gaits of the first robot by name, and the metrics of all."""
 
     config: Config
-    gaits: dict[str, Gait]
+    gaits: dict[str, LearnedGait]
     metrics: Table
 
 
-def walk_table(config: Config, gait: Gait) -> Table:
+def walk_table(config: Config, gait: LearnedGait) -> Table:
     """How a walk went; what a robot that fell did not do is None."""
     if gait.walk is None or gait.learned is None:
         return {"falls": 1}
@@ -87,12 +87,12 @@ def forward_speed(walk: Walk) -> float:
     return float(way / (walk.times[-1] - walk.times[0]))
 
 
-def fell(gait: Gait, walk: Walk) -> bool:
+def fell(gait: LearnedGait, walk: Walk) -> bool:
     """Whether the trunk tilts by over 60 degrees, or sinks below half a leg (walkmetrics)."""
     return bool(np.isfinite(walk_metrics.fall_times(walk, gait.trunk.settings.leg)[0]))
 
 
-def seeds_table(config: Config, found: dict[tuple[int, str], Gait]) -> Table:
+def seeds_table(config: Config, found: dict[tuple[int, str], LearnedGait]) -> Table:
     """By gait: how many robots walk without a fall, in the gait that was taught; all speeds."""
     table: Table = {}
     for name in config.gaits:

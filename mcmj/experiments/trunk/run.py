@@ -7,7 +7,7 @@ from functools import partial
 
 from mcmj.experiments.trunk.config import Config
 from mcmj.experiments.trunk.parts import RUNS, push_summary
-from mcmj.experiments.trunk.result import Gait, Result, Table, seeds_table, walk_table
+from mcmj.experiments.trunk.result import LearnedGait, Result, Table, seeds_table, walk_table
 from mcmj.robots.force_learning import force_learn
 from mcmj.robots.trunk import draw_trunk, muscle_target
 from mcmj.robots.trunk_walker import TrunkWalker
@@ -42,7 +42,7 @@ def run(config: Config, *, on_steps: OnSteps = lambda steps: None) -> Result:
     return Result(config, gaits, table)
 
 
-def learn(config: Config, robot: tuple[int, str], on_steps: OnSteps) -> Gait:
+def learn(config: Config, robot: tuple[int, str], on_steps: OnSteps) -> LearnedGait:
     """One robot, by its seed, learns one gait, by its name, and walks."""
     seed, name = robot
     trunk = draw_trunk(seed, config.trunk)
@@ -52,6 +52,6 @@ def learn(config: Config, robot: tuple[int, str], on_steps: OnSteps) -> Gait:
         learned = force_learn(walker, target, config.learning, seed=seed, on_steps=on_steps)
         walk = walker.walk(config.walking)
     except DivergenceError:
-        return Gait(trunk, target, None, None)
+        return LearnedGait(trunk, target, None, None)
     on_steps(round(config.walking / walker.timestep))
-    return Gait(trunk, target, learned, walk)
+    return LearnedGait(trunk, target, learned, walk)

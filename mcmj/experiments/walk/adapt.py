@@ -6,7 +6,7 @@ Every ground is walked on from several moments of the stride, by the body that d
 
 import numpy as np
 
-from mcmj.experiments.walk.lesson import Lesson, Table, states_at
+from mcmj.experiments.walk.lesson import Table, WalkLesson, states_at
 from mcmj.robots import walk_metrics
 from mcmj.robots.quadruped import GRAVITY
 from mcmj.robots.walk_metrics import Walk
@@ -17,7 +17,7 @@ from mcmj.utils.progress import OnSteps
 from mcmj.utils.validation import Array
 
 
-def adapt(lesson: Lesson, name: str, on_steps: OnSteps = lambda steps: None) -> Table:
+def adapt(lesson: WalkLesson, name: str, on_steps: OnSteps = lambda steps: None) -> Table:
     """One gait on slopes [degrees] and with loads [kg], without coupling and with it."""
     return {
         label: _response(lesson, name, coupling, on_steps)
@@ -25,7 +25,7 @@ def adapt(lesson: Lesson, name: str, on_steps: OnSteps = lambda steps: None) -> 
     }
 
 
-def _response(lesson: Lesson, name: str, coupling: float, on_steps: OnSteps) -> Table:
+def _response(lesson: WalkLesson, name: str, coupling: float, on_steps: OnSteps) -> Table:
     config, gait = lesson.config, lesson.gait(name, coupling)
     waits = lesson.period(name) * np.arange(config.starts) / config.starts
     states = states_at(lesson, gait, waits, coupling)
@@ -45,7 +45,7 @@ def _response(lesson: Lesson, name: str, coupling: float, on_steps: OnSteps) -> 
     return {"slope": _sorted(slopes | {"0": level}), "load": _sorted(loads | {"0": level})}
 
 
-def _row(lesson: Lesson, name: str, walker: Walker, walk: Walk, slope: float) -> Table:
+def _row(lesson: WalkLesson, name: str, walker: Walker, walk: Walk, slope: float) -> Table:
     """Falls, and the spread over the copies that did not.
 
     ground_lag is that of the feet's load behind the outputs, mean of all legs [strides].

@@ -24,7 +24,7 @@ Table = dict[str, object]
 
 
 @dataclass(frozen=True)
-class Lesson:
+class WalkLesson:
     """What all parts of the experiment start from: the body and its gaits.
 
     Attributes:
@@ -59,7 +59,7 @@ class Lesson:
         return self.grounded[name] if coupling else self.gaits[name]
 
 
-def learn(config: Config) -> Lesson:
+def learn(config: Config) -> WalkLesson:
     """Take the config's body and gaits, teach it how far the legs are lifted, and the ground."""
     body, readouts = get_body(config)
 
@@ -68,7 +68,7 @@ def learn(config: Config) -> Lesson:
         return teach_lift(body, readouts[name], gait_target(name), stride=stride, engine="twin")
 
     gaits, lifts = _taught(config, lift)
-    lesson = Lesson(config, body, gaits, fits={"lift_nrmse": lifts})
+    lesson = WalkLesson(config, body, gaits, fits={"lift_nrmse": lifts})
     if not {"adapt", "recover"} & set(config.parts):
         return lesson
 
@@ -91,7 +91,7 @@ def _taught(
     return gaits, {name: fit.train_nrmse for name, (_, fit) in results.items()}
 
 
-def walk_table(lesson: Lesson, name: str, walk: Walk) -> Table:
+def walk_table(lesson: WalkLesson, name: str, walk: Walk) -> Table:
     """How a walk (its first copy) went after the first `settle` seconds."""
     config = lesson.config
     fallen = np.isfinite(walk_metrics.fall_times(walk, config.robot.leg)[0])
@@ -110,7 +110,7 @@ def walk_table(lesson: Lesson, name: str, walk: Walk) -> Table:
     return {"falls": int(fallen), **measured, "stride_period_s": period}
 
 
-def states_at(lesson: Lesson, gait: LegReadout, waits: Array, coupling: float = 0.0) -> Array:
+def states_at(lesson: WalkLesson, gait: LegReadout, waits: Array, coupling: float = 0.0) -> Array:
     """States (len(waits), n) of a robot after `before` seconds and ascending waits [s] more."""
     walker = lesson.walker(coupling=coupling)
     walker.start(gait)

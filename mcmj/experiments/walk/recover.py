@@ -7,7 +7,7 @@ the legs is never moved: its outputs keep the same bits.
 import numpy as np
 from scipy.spatial import cKDTree
 
-from mcmj.experiments.walk.lesson import Lesson, Table, states_at
+from mcmj.experiments.walk.lesson import Table, WalkLesson, states_at
 from mcmj.metrics.orbits import rms_radius
 from mcmj.robots import walk_metrics
 from mcmj.robots.walk_metrics import Walk
@@ -19,7 +19,7 @@ STRIDES = 4  # at the end, by which phases are compared
 DIRECTIONS = {"forwards": (1.0, 0.0), "sideways": (0.0, 1.0)}
 
 
-def recover(lesson: Lesson, name: str, on_steps: OnSteps = lambda steps: None) -> Table:
+def recover(lesson: WalkLesson, name: str, on_steps: OnSteps = lambda steps: None) -> Table:
     """Pushes on one gait, by direction, without coupling and with it; lists are over `moments`.
 
     wander is how far an unpushed walk comes from its own orbit: below that there is no recovery.
@@ -32,7 +32,9 @@ def recover(lesson: Lesson, name: str, on_steps: OnSteps = lambda steps: None) -
     }
 
 
-def _pushed(lesson: Lesson, name: str, coupling: float, waits: Array, on_steps: OnSteps) -> Table:
+def _pushed(
+    lesson: WalkLesson, name: str, coupling: float, waits: Array, on_steps: OnSteps
+) -> Table:
     config, gait, n = lesson.config, lesson.gait(name, coupling), len(waits)
     pushes = config.nudge * np.array([(0.0, 0.0), *DIRECTIONS.values()])
     walker = lesson.walker(coupling=coupling, copies=n * len(pushes))

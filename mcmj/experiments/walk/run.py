@@ -12,7 +12,7 @@ import numpy as np
 
 from mcmj.experiments.walk.adapt import adapt
 from mcmj.experiments.walk.config import Config
-from mcmj.experiments.walk.lesson import Lesson, Table, learn, states_at, walk_table
+from mcmj.experiments.walk.lesson import Table, WalkLesson, learn, states_at, walk_table
 from mcmj.experiments.walk.recover import recover
 from mcmj.robots import walk_metrics
 from mcmj.robots.walk_metrics import Walk
@@ -34,7 +34,7 @@ class Result:
     """Walks by gait (one copy each), and the metrics of every part."""
 
     config: Config
-    lesson: Lesson
+    lesson: WalkLesson
     walks: dict[str, Walk]
     metrics: Table
 
@@ -75,7 +75,7 @@ def _each(items: Sequence[K], work: Callable[[K, OnSteps], V], on_steps: OnSteps
     return dict(zip(items, in_threads(work, items, on_steps), strict=True))
 
 
-def walk_gait(lesson: Lesson, name: str, on_steps: OnSteps = lambda steps: None) -> Walk:
+def walk_gait(lesson: WalkLesson, name: str, on_steps: OnSteps = lambda steps: None) -> Walk:
     """A walk in one gait, the first `settle` seconds included."""
     walker = lesson.walker()
     walker.start(lesson.gaits[name])
@@ -85,7 +85,7 @@ def walk_gait(lesson: Lesson, name: str, on_steps: OnSteps = lambda steps: None)
     return walk
 
 
-def tour(lesson: Lesson) -> tuple[Walker, Walk, list[tuple[float, str]]]:
+def tour(lesson: WalkLesson) -> tuple[Walker, Walk, list[tuple[float, str]]]:
     """One walk through all gaits and back to the first, for a film; with the times of switches."""
     config = lesson.config
     order = [*config.gaits, config.gaits[0]]
@@ -100,7 +100,7 @@ def tour(lesson: Lesson) -> tuple[Walker, Walk, list[tuple[float, str]]]:
 
 
 def switch(
-    lesson: Lesson, pair: tuple[str, str], on_steps: OnSteps = lambda steps: None
+    lesson: WalkLesson, pair: tuple[str, str], on_steps: OnSteps = lambda steps: None
 ) -> list[float]:
     """At which moments of the stride, in strides, a switch from one gait to another ends in a fall.
 
@@ -120,7 +120,7 @@ def switch(
     return found
 
 
-def push(lesson: Lesson, name: str, on_steps: OnSteps = lambda steps: None) -> dict[float, int]:
+def push(lesson: WalkLesson, name: str, on_steps: OnSteps = lambda steps: None) -> dict[float, int]:
     """How many of `seeds` pushes of each size a gait survives, at random moments and directions."""
     config, gait = lesson.config, lesson.gaits[name]
     waits = stream(config.seed, "walk_moments").uniform(0.0, 2.0, config.seeds)
@@ -162,7 +162,7 @@ def push_table(config: Config, survived: Mapping[str, Mapping[float, int]]) -> T
     return table
 
 
-def step_study(lesson: Lesson, name: str, on_steps: OnSteps = lambda steps: None) -> Table:
+def step_study(lesson: WalkLesson, name: str, on_steps: OnSteps = lambda steps: None) -> Table:
     """Statistics of the same walk at other time steps [ms of the body as it was taught]."""
     table: Table = {}
     for step in lesson.config.steps_ms:
@@ -174,7 +174,7 @@ def step_study(lesson: Lesson, name: str, on_steps: OnSteps = lambda steps: None
     return table
 
 
-def step_cost(lesson: Lesson) -> Table:
+def step_cost(lesson: WalkLesson) -> Table:
     """Time of a step of the whole scene over that of the planar body alone, in turns."""
     name = lesson.config.gaits[0]
     walker = lesson.walker()

@@ -11,7 +11,7 @@ from mcmj.core.rollout_arguments import Drive
 from mcmj.core.trajectory import State
 from mcmj.reference.twin.kernels import Bodies
 from mcmj.reference.twin.packs import Packs
-from mcmj.reference.twin.stepping import KernelState, Record, Schedule
+from mcmj.reference.twin.stepping import KernelDrive, KernelState, Record
 from mcmj.utils.errors import InvalidArgumentError
 from mcmj.utils.validation import Array
 
@@ -84,7 +84,7 @@ def to_packs(bodies: Sequence[Body], readouts: Sequence[object]) -> Packs:
     )
 
 
-def to_schedule(drive: Drive, start: int, stop: int) -> Schedule:
+def to_schedule(drive: Drive, start: int, stop: int) -> KernelDrive:
     """Steps start .. stop - 1 of a drive; what is shared or absent takes no room."""
 
     def part(values: Array | None) -> Array:
@@ -93,7 +93,7 @@ def to_schedule(drive: Drive, start: int, stop: int) -> Schedule:
         rows = values if values.shape[-2] == 1 else values[..., start:stop, :]
         return np.ascontiguousarray(rows if rows.ndim == 3 else rows[None])
 
-    return Schedule(part(drive.inputs), part(drive.offset), part(drive.forces), drive.gate[None])
+    return KernelDrive(part(drive.inputs), part(drive.offset), part(drive.forces), drive.gate[None])
 
 
 def to_kernel_state(bodies: Sequence[Body], states: Sequence[State]) -> KernelState:

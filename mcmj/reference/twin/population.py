@@ -19,7 +19,14 @@ from mcmj.reference.twin.layout import (
     to_schedule,
 )
 from mcmj.reference.twin.packs import Packs, integrate_packs
-from mcmj.reference.twin.stepping import LEAPFROG, METHODS, KernelState, Record, Run, scheme_of
+from mcmj.reference.twin.stepping import (
+    LEAPFROG,
+    METHODS,
+    KernelRun,
+    KernelState,
+    Record,
+    scheme_of,
+)
 from mcmj.utils.errors import DivergenceError, InvalidArgumentError, UnknownNameError
 from mcmj.utils.validation import Array, require_count, require_number
 
@@ -117,7 +124,7 @@ class Population:
         kernel = integrate_packs if self._packed else integrate_bodies
 
         scheme = scheme_of(self.method, float(self.timestep))
-        run = Run(schedule, self._state, record, done, scheme, steps)
+        run = KernelRun(schedule, self._state, record, done, scheme, steps)
 
         def part(first: int, last: int) -> None:
             kernel(self._layout, run, first, last)

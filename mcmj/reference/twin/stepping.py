@@ -41,7 +41,7 @@ COMPILE: dict[str, Any] = {
 INLINE: dict[str, Any] = {**COMPILE, "forceinline": True}
 
 
-class Schedule(NamedTuple):
+class KernelDrive(NamedTuple):
     """What happens when; a first or second axis of size 1 is shared by bodies or steps."""
 
     inputs: np.ndarray  # (B or 1, T or 1, n_in or 0)
@@ -78,10 +78,10 @@ class Scheme(NamedTuple):
     toolbox: bool  # springs and feedback look one step back
 
 
-class Run(NamedTuple):
+class KernelRun(NamedTuple):
     """`steps` steps of B bodies."""
 
-    schedule: Schedule
+    schedule: KernelDrive
     state: KernelState
     record: Record
     done: np.ndarray  # (B,) int64: takes every body's finite steps
