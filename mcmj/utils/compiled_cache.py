@@ -2,10 +2,15 @@
 
 Where neither can be written, or a file there is cut off (a killed process, a full disk), Numba
 raises at import or in the middle of a run. Then a temporary folder takes their place.
+
+Numba knows a function's code by the date of its own file, and does not look at what it calls in
+other files: after an update it would run code of before. A stamp beside the cache names the
+sources that it was compiled from; of others, it is emptied.
 """
 
 import atexit
 import functools
+import hashlib
 import os
 import pickletools
 import shutil
@@ -19,6 +24,7 @@ from mcmj.utils.errors import McmjWarning
 
 _HERE = Path(__file__).parent
 _PACKAGE = _HERE.parent
+_COMPILED = ("core/callbacks", "reference/twin")  # folders of compiled code
 
 
 @functools.cache  # every package of compiled code asks, before it is imported
@@ -51,10 +57,31 @@ def _trouble() -> str | None:
         cache = numba.njit(cache=True)(_trouble).stats.cache_path or ""
     except RuntimeError:  # "no locator available"
         return "neither the package's folder nor the user's cache folder can be written"
+    if not _is_of_these_sources(Path(cache)):
+        return f"{cache} was compiled from other sources, and cannot be emptied"
     for file in _cached_files(Path(cache)):
         if not _is_whole(file):
             return f"{file} is damaged (delete it)"
     return None
+
+
+def _is_of_these_sources(cache: Path) -> bool:
+    """Whether the cache is of the sources as they are, emptied if need be."""
+    digest = hashlib.blake2b(digest_size=8)
+    for folder in _COMPILED:
+        for source in sorted((_PACKAGE / folder).glob("*.py")):
+            digest.update(source.name.encode() + source.read_bytes())
+    stamp = cache / f"mcmj-{digest.hexdigest()}"
+    if stamp.exists():
+        return True
+    try:
+        for file in [*_cached_files(cache), *cache.glob("mcmj-*")]:
+            file.unlink(missing_ok=True)
+        cache.mkdir(parents=True, exist_ok=True)
+        stamp.touch()
+    except OSError:
+        return False
+    return True
 
 
 def _cached_files(cache: Path) -> list[Path]:

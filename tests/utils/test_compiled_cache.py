@@ -70,3 +70,24 @@ def test_a_cache_that_is_cut_off(kind, own_folder, place):
     assert cache != expected
     file.unlink()
     assert run(place, **environment) == (expected, "")
+
+
+def test_code_of_other_sources_is_never_run(place):
+    """Numba does not see that a function which a compiled one calls, in another file, changed."""
+    twin = "import mcmj; body = mcmj.random_body(1, nodes=6);"
+    twin += "run = mcmj.Simulation(body, engine='twin').rollout(50, offset=[[3.0, 1.0]] * 50);"
+    twin += "print(repr(run.lengths[-1, 0]))"
+
+    def length():
+        return subprocess.run(
+            [sys.executable, "-c", twin], cwd="/", capture_output=True, text=True, check=True,
+            env=os.environ | {"PYTHONPATH": str(place), "HOME": str(place)},
+        ).stdout  # fmt: skip
+
+    before = length()
+    assert length() == before
+    source = place / "mcmj" / "reference" / "twin" / "stepping.py"
+    law = "pull = x1 * (k1 + k3 * x1 * x1)"
+    assert law in source.read_text()
+    source.write_text(source.read_text().replace(law, "pull = x1 * (k1 + k1 + k3 * x1 * x1)"))
+    assert length() != before
