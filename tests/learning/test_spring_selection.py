@@ -7,6 +7,7 @@ import pytest
 
 from mcmj.core.random_body import BodySettings
 from mcmj.experiments.prune import run as prune
+from mcmj.experiments.prune.config import total_runs
 from mcmj.learning.lessons import Teaching
 from mcmj.learning.regression import Regression, fit_readout
 from mcmj.learning.spring_selection import importance, sense_only
@@ -100,4 +101,4 @@ def test_few_well_chosen_springs_run_the_loop():
     assert result.needed("backward", 0) in (8, 16)
     mujoco = prune.run(prune.Config(**{**vars(config), "engine": "mujoco"}))
     assert np.allclose(mujoco.errors("backward")[0][2], errors[2], rtol=1e-3)
-    assert prune.total_runs(config) == 4
+    assert total_runs(config) == 4
