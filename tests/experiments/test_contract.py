@@ -56,7 +56,7 @@ APART = {"reproduce", "view"}  # commands of commands, and a person; tested on t
 TIMED = ("*second*", "*_ms", "*ratio*", "*cost*", "*speed*", "*memory*", "*start*", "*import*",
          "growth*", "machine*", "*overhead*", "*us_per*", "*ns_per*",
          "*_mb")  # fmt: skip
-SLOW = dict.fromkeys(("benchmark", "certify", "input_driven"), pytest.mark.slow)
+SLOW = dict.fromkeys(("benchmark", "certify", "input_driven", "success_rate"), pytest.mark.slow)
 BAD = {  # an option that the experiment must refuse by its name, where it is not --seed
     "render": ("--stills", "0"), "guided": ("--bodies", "0"), "search": ("--seeds", "0"),
     "success_rate": ("--seeds", "0"), "gaits": ("--seeds", "0"), "limit_cycle": ("--window", "-1"),

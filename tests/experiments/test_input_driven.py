@@ -272,6 +272,7 @@ def test_a_window_must_hold_a_period_of_every_input():
         input_driven.run(replace(QUICK, window=2.0))
 
 
+@pytest.mark.slow
 def test_script_writes_everything(tmp_path):
     options = [
         "--engine", "twin", "--nodes", "15", "--profile", "lin 1 2 10, hold 2 10", "--run-in", "5",

@@ -14,7 +14,8 @@ from mcmj.targets.limit_cycles import target
 
 WITH_TASK = [name for name in entries() if hasattr(experiment_named(name).config, "task")]
 SLOW = [
-    pytest.param(name, marks=pytest.mark.slow if name == "certify" else ()) for name in WITH_TASK
+    pytest.param(name, marks=() if name in ("limit_cycle", "perturb") else pytest.mark.slow)
+    for name in WITH_TASK
 ]
 PROGRAM = "from mcmj.targets.limit_cycles import quadratic\ndef mine(): return quadratic(5.0)\n"
 

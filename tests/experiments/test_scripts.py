@@ -113,6 +113,7 @@ def test_an_interrupt_leaves_nothing_half_written(tmp_path):
     assert all(path.name.startswith(".checkpoint-") for path in tmp_path.iterdir())
 
 
+@pytest.mark.slow
 def test_success_rate(tmp_path):
     options = ["--seeds", "2", "--seed", "5", "--nodes", "10", "--duration", "6"]
     options += ["--washout", "2", "--free-run", "20", "--quiet", "--out", tmp_path]
@@ -126,6 +127,7 @@ def test_success_rate(tmp_path):
     assert body == mcmj.random_body(document["metrics"]["best_seed"], 10)
 
 
+@pytest.mark.slow
 def test_speed_accuracy(tmp_path):
     methods = ["mujoco_Euler", "mujoco_leapfrog", "twin_rk4"]
     options = ["--bodies", "toolbox_n10", "--methods", *methods, "--steps-ms", "0.5", "1", "2"]
@@ -141,6 +143,7 @@ def test_speed_accuracy(tmp_path):
     assert (tmp_path / "speed_accuracy.csv").read_text().count("\n") == 10
 
 
+@pytest.mark.slow
 def test_gaits(tmp_path):
     options = ["--gaits", "trot", "pace", "--seed", "3", "--nodes", "12", "--engine", "twin"]
     options += ["--duration", "10", "--washout", "4", "--free-run", "8", "--before", "5"]
@@ -170,6 +173,7 @@ def test_benchmark(tmp_path):
         assert metrics[name] > 0, name
 
 
+@pytest.mark.slow
 def test_emulate(tmp_path):
     options = ["--targets", "van_der_pol", "driven_duffing", "--integrators", "Euler", "RK4"]
     options += ["--steps-ms", "1", "2", "4", "--horizon", "2", "--g=-x1", "--out", tmp_path]
@@ -182,6 +186,7 @@ def test_emulate(tmp_path):
     assert (tmp_path / "emulate.png").stat().st_size > 10_000
 
 
+@pytest.mark.slow
 def test_linearise(tmp_path):
     options = ["--sizes", "2", "--memory-sizes", "2", "--diversities", "1", "0.1", "--train", "5"]
     options += ["--test", "2", "--washout", "1", "--symbolic-masses", "2", "--out", tmp_path]
@@ -194,6 +199,7 @@ def test_linearise(tmp_path):
     assert (tmp_path / "linearisability.txt").read_text() in out
 
 
+@pytest.mark.slow
 def test_filters(tmp_path):
     options = ["--nodes", "10", "--train", "3", "--washout", "1", "--test", "2", "--symbols", "100"]
     options += ["--test-symbols", "40", "--lesson", "20", "--exam", "20", "--engine", "twin"]
@@ -205,6 +211,7 @@ def test_filters(tmp_path):
     assert {"filters.png", "switch.png"} <= {path.name for path in tmp_path.iterdir()}
 
 
+@pytest.mark.slow
 def test_capacity(tmp_path):
     options = ["--nodes", "8", "--symbols", "200", "--max-delays", "10", "3", "--streams", "10"]
     options += ["--stream-symbols", "12", "--map-symbols", "150", "--stiffness", "1", "--damping"]
@@ -217,6 +224,7 @@ def test_capacity(tmp_path):
     assert np.shape(metrics["maps"]["size_strength"]["ipc_total"]) == (1, 2)
 
 
+@pytest.mark.slow
 def test_perturb_and_swing_up(tmp_path):
     taught = ["--task", "quadratic", "--seed", "0", "--nodes", "12", "--engine", "twin"]
     taught += ["--duration", "12", "--washout", "4", "--rest-runs", "0"]
@@ -261,6 +269,7 @@ def test_walk(tmp_path):
         assert (tmp_path / figure).stat().st_size > 10_000
 
 
+@pytest.mark.slow
 def test_trunk(tmp_path):
     """Figure, readouts and metrics; seconds of learning are too few to ask for more than that."""
     options = ["--gaits", "bound", "--parts", "rest", "--seeds", "2", "--no-video"]

@@ -57,6 +57,7 @@ def test_a_read_only_package_and_home(place):
     assert not Path(cache).exists()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("kind", "own_folder"), [("nbi", True), ("nbc", False)])
 def test_a_cache_that_is_cut_off(kind, own_folder, place):
     environment = {"NUMBA_CACHE_DIR": str(place / "cache")} if own_folder else {}
@@ -72,6 +73,7 @@ def test_a_cache_that_is_cut_off(kind, own_folder, place):
     assert run(place, **environment) == (expected, "")
 
 
+@pytest.mark.slow
 def test_code_of_other_sources_is_never_run(place):
     """Numba does not see that a function which a compiled one calls, in another file, changed."""
     twin = "import mcmj; body = mcmj.random_body(1, nodes=6);"
