@@ -16,7 +16,7 @@ import mujoco
 import numpy as np
 import numpy.typing as npt
 
-from mcmj.core.callbacks.reservoir_law import NUMERIC, block
+from mcmj.core.callbacks.reservoir_law import NUMERIC, Law, block
 from mcmj.core.integrators import integrator_named
 from mcmj.utils.errors import BodyFileError, InvalidArgumentError, UnknownNameError
 from mcmj.utils.quiet import quiet_warnings
@@ -76,31 +76,60 @@ class AdoptedModel:
     memory: int
 
 
-def adopt(
-    model: Model,
-    sensors: str | Sequence[str],
-    channels: Channels,
-    inputs: Channels = (),
-    *,
-    timestep: float | None = None,
-    integrator: str | None = None,
-    feedback_delay: int = 0,
-) -> AdoptedModel:
-    """A model with the channels of a reservoir; the arguments are those of Reservoir.
+def read_spec(
+    model: Model, timestep: float | None = None, integrator: str | None = None
+) -> mujoco.MjSpec:
+    """A copy of a model as MjSpec, with another step [s] or integrator if given.
 
     Raises:
         BodyFileError: no such file, or not a model.
-        InvalidArgumentError, UnknownNameError: an argument out of bounds, or a name or pattern
-            that the model does not have.
+        InvalidArgumentError, UnknownNameError: an argument out of bounds.
     """
-    spec = _spec(model)
-    require_count("feedback_delay", feedback_delay, 0)
+    spec = _copied(model)
     if timestep is not None:
         require_number("timestep", timestep, 0.0, open_low=True)
         spec.option.timestep = timestep
     if integrator is not None:
         name = integrator_named(integrator).mujoco_name
         spec.option.integrator = getattr(mujoco.mjtIntegrator, f"mjINT_{name.upper()}")
+    return spec
+
+
+def _copied(model: Model) -> mujoco.MjSpec:
+    if isinstance(model, mujoco.MjSpec):
+        return model.copy()
+    if isinstance(model, mujoco.MjModel):
+        raise InvalidArgumentError(
+            "model", "MJCF (a path or a string) or an MjSpec: a compiled model takes no channels",
+            "an MjModel",
+        )  # fmt: skip
+    try:
+        with quiet_warnings():
+            if isinstance(model, str) and model.lstrip().startswith("<"):
+                return mujoco.MjSpec.from_string(model)
+            return mujoco.MjSpec.from_file(str(Path(model)))
+    except (ValueError, OSError, TypeError) as error:
+        raise BodyFileError(f"model: {' '.join(str(error).split())}") from error
+
+
+def adopt(
+    spec: mujoco.MjSpec,
+    sensors: str | Sequence[str],
+    channels: Channels,
+    inputs: Channels = (),
+    feedback_delay: int = 0,
+) -> AdoptedModel:
+    """A model with the channels of a reservoir; the arguments are those of Reservoir.
+
+    Args:
+        spec: of `read_spec`; it is changed.
+
+    Raises:
+        BodyFileError: not a model.
+        InvalidArgumentError, UnknownNameError: an argument out of bounds, or a name or pattern
+            that the model does not have.
+    """
+    require_count("feedback_delay", feedback_delay, 0)
     heard = _resolved_sensors(spec, sensors)
     drives: list[list[dict[str, float]]] = []
     names: list[tuple[str, ...]] = []
@@ -121,13 +150,14 @@ def stored(model: Model) -> tuple[mujoco.MjSpec, dict[str, Any], Array | None]:
     """What a file of a trained reservoir holds.
 
     Returns:
-        the model as it was before it was adopted, the arguments of `adopt`, and the readout
+        the model as it was before it was adopted, the other arguments of `adopt`, and the
+        readout
         (n_signals + 1, n_channels), or None.
 
     Raises:
         BodyFileError: no such file, not a model, or not that of a reservoir.
     """
-    spec = _spec(model)
+    spec = read_spec(model)
     texts = {text.name: text for text in spec.texts}
     numbers = {numeric.name: numeric for numeric in spec.numerics}
     try:
@@ -147,24 +177,6 @@ def stored(model: Model) -> tuple[mujoco.MjSpec, dict[str, Any], Array | None]:
     for element in (*added, texts[SETTINGS], law):
         spec.delete(element)
     return spec, given, w_out
-
-
-def _spec(model: Model) -> mujoco.MjSpec:
-    """A copy of the model as MjSpec."""
-    if isinstance(model, mujoco.MjSpec):
-        return model.copy()
-    if isinstance(model, mujoco.MjModel):
-        raise InvalidArgumentError(
-            "model", "MJCF (a path or a string) or an MjSpec: a compiled model takes no channels",
-            "an MjModel",
-        )  # fmt: skip
-    try:
-        with quiet_warnings():
-            if isinstance(model, str) and model.lstrip().startswith("<"):
-                return mujoco.MjSpec.from_string(model)
-            return mujoco.MjSpec.from_file(str(Path(model)))
-    except (ValueError, OSError, TypeError) as error:
-        raise BodyFileError(f"model: {' '.join(str(error).split())}") from error
 
 
 def _resolved_sensors(spec: mujoco.MjSpec, sensors: str | Sequence[str]) -> list[str]:
@@ -243,20 +255,23 @@ def _with_channels(
     law_reads = heard if feedback_delay == 0 else _delayed(spec, heard, feedback_delay)
     signals, signal_names, late = _addresses(_compiled(spec), heard)
     read = _addresses(_compiled(spec), law_reads)[0].tolist()
-    numbers = block(
-        read,
-        [place for place, slow in zip(read, late, strict=True) if slow],
-        [
-            (actuators[name], channel, gain)
-            for channel, gains in enumerate(drives)
-            for name, gain in gains.items()
-        ],
+    slow = [place for place, is_late in zip(read, late, strict=True) if is_late]
+    law_drives = [
+        (actuators[name], channel, gain)
+        for channel, gains in enumerate(drives)
+        for name, gain in gains.items()
+    ]
+    law = Law(
         outputs=len(names[0]),
         first=bare.nu,
         clock=int(bare.sensor(f"{OURS}time").adr[0]),
+        signals=len(read),
+        late=len(slow),
+        drives=len(law_drives),
         memory=bare.nuserdata,
-        delay=max(0.0, feedback_delay - 0.5) * spec.option.timestep,
     )
+    delay = max(0.0, feedback_delay - 0.5) * spec.option.timestep
+    numbers = block(law, read, slow, law_drives, delay)
     spec.nuserdata = bare.nuserdata + (1 + int(late.sum()) if late.any() else 0)
     spec.nuser_actuator = max(bare.nuser_actuator, len(signals) + 1)
     for kind, name in [*(("output", n) for n in names[0]), *(("input", n) for n in names[1])]:

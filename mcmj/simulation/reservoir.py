@@ -19,7 +19,15 @@ from mujoco.batch import Batch
 from mcmj.core.callbacks import install
 from mcmj.core.readout import Readout, readout_rows
 from mcmj.core.trajectory import Trajectory, join
-from mcmj.simulation.adopted_model import OURS, SETTINGS, Channels, Model, adopt, stored
+from mcmj.simulation.adopted_model import (
+    OURS,
+    SETTINGS,
+    Channels,
+    Model,
+    adopt,
+    read_spec,
+    stored,
+)
 from mcmj.utils.errors import DivergenceError, InvalidArgumentError, UnknownNameError
 from mcmj.utils.quiet import quiet_warnings
 from mcmj.utils.validation import MOST_STEPS, Array, as_array, require_count
@@ -64,10 +72,8 @@ class Reservoir:
         integrator: str | None = None,
         feedback_delay: int = 0,
     ) -> None:
-        self._adopted = adopt(
-            model, sensors, channels, inputs,
-            timestep=timestep, integrator=integrator, feedback_delay=feedback_delay,
-        )  # fmt: skip
+        spec = read_spec(model, timestep, integrator)
+        self._adopted = adopt(spec, sensors, channels, inputs, feedback_delay)
         install.install_control()
         self._batch = Batch(self.model, 1, 1)
         self.steps_done = 0

@@ -229,10 +229,10 @@ def test_a_chain_of_masses_learns_a_rhythm_through_its_own_sensors_and_motors():
 HOSTILE = """
 import mujoco, numpy as np
 from mcmj.core.callbacks import install
-from mcmj.core.callbacks.reservoir_law import RESERVOIR_TAG, block
+from mcmj.core.callbacks.reservoir_law import RESERVOIR_TAG, Law, block
 install.install_control()
 rng = np.random.default_rng(0)
-good = block([0, 1], [1], [(0, 0, 1.0)], outputs=1, first=1, clock=2, delay=0.0, memory=0)
+good = block(Law(1, 1, 2, 2, 1, 1, 0), [0, 1], [1], [(0, 0, 1.0)], 0.0)
 bad = [np.nan, np.inf, -1.0, 0.5, 1e9, 1e300, -1e300, 2.0**63, 3.0, 0.0]
 for case in range(400):
     values = list(good)

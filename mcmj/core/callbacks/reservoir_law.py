@@ -34,31 +34,42 @@ _HEAD = 9
 COMPILE: dict[str, Any] = {"cache": True, "fastmath": {"contract", "reassoc", "nsz", "arcp"}}
 
 
+class Law(NamedTuple):
+    """The sizes of a law, and where its parts are.
+
+    Attributes:
+        outputs: number of outputs; the channels are these, then the inputs.
+        first: actuator of the first channel; those of the others follow it.
+        clock: address in sensordata of a sensor of the time.
+        signals, late, drives: numbers of them, see `block`.
+        memory: in userdata, where the values of the late signals begin, after a 1 if they hold.
+    """
+
+    outputs: int
+    first: int
+    clock: int
+    signals: int
+    late: int
+    drives: int
+    memory: int
+
+
 def block(
+    law: Law,
     signals: Sequence[int],
     late: Sequence[int],
     drives: Sequence[tuple[int, int, float]],
-    *,
-    outputs: int,
-    first: int,
-    clock: int,
     delay: float,
-    memory: int,
 ) -> list[float]:
     """The custom numeric of a model.
 
     Args:
         signals: addresses in sensordata.
         late: those of them that MuJoCo computes after actuation.
-        drives: (actuator, channel, gain); channels are the outputs, then the inputs.
-        outputs: number of outputs.
-        first: actuator of the first channel; those of the others follow it.
-        clock: address of a sensor of the time.
+        drives: (actuator, channel, gain), those of a channel beside each other.
         delay: of the sensors [s]; until then the outputs are 0.
-        memory: in userdata, where the values of `late` begin, after a 1 if they hold.
     """
-    sizes = len(signals), len(late), len(drives)
-    head = [RESERVOIR_TAG, outputs, first, clock, *sizes, delay, memory]
+    head = [RESERVOIR_TAG, *law[:6], delay, law.memory]
     return [*map(float, (*head, *signals, *late)), *(float(x) for drive in drives for x in drive)]
 
 
@@ -80,18 +91,6 @@ class Offsets(NamedTuple):
     sensordata: int
     userdata: int
     time: int
-
-
-class Law(NamedTuple):
-    """A model's block, checked against its sizes; see `block`."""
-
-    outputs: int
-    first: int
-    clock: int
-    signals: int
-    late: int
-    drives: int
-    memory: int
 
 
 def compile_control() -> CFunction:
