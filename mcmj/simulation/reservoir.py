@@ -76,6 +76,7 @@ class Reservoir:
         self._adopted = adopt(spec, sensors, channels, inputs, feedback_delay)
         install.install_control()
         self._batch = Batch(self.model, 1, 1)
+        self._views: dict[str, Array] = {}
         self.steps_done = 0
         self.reset()
         self.set_readout(w_out)
@@ -187,7 +188,7 @@ class Reservoir:
             except (KeyError, IndexError) as error:
                 raise InvalidArgumentError("keyframe", "one of the model", keyframe) from error
             for name in ("qpos", "qvel", "act"):
-                self._batch.bind(name)[:] = getattr(key, name)
+                self._bound(name)[:] = getattr(key, name)
         self.steps_done = 0
         self._heard_late = np.zeros(int(self._adopted.late.sum()))
 
@@ -199,7 +200,7 @@ class Reservoir:
         """
         for name, value, size in (("qpos", qpos, self.model.nq), ("qvel", qvel, self.model.nv)):
             if value is not None:
-                self._batch.bind(name)[:] = as_array(name, value, (size,))
+                self._bound(name)[:] = as_array(name, value, (size,))
 
     def snapshot(self) -> Array:
         """All that `restore` needs to continue from here, bit for bit."""
@@ -219,7 +220,7 @@ class Reservoir:
         self._batch.state[:] = values[:n]
         self.steps_done, self._heard_late = int(values[n]), values[n + 1 : -1].copy()
         if late:  # the law puts them back, see mcmj.core.callbacks.reservoir_law
-            memory = self._batch.bind("userdata")[0, self._adopted.memory :]
+            memory = self._bound("userdata")[0, self._adopted.memory :]
             memory[0], memory[1 : 1 + late] = 1.0, self._heard_late
 
     @cached_property
@@ -281,6 +282,12 @@ class Reservoir:
         gates = as_array("gate", gate, (self.n_outputs,))
         return self._chunks(total, arrays, gates, frozenset(record), chunk)
 
+    def _bound(self, name: str) -> Array:
+        """A view (1, n) of the simulation's data; making one costs as much as hundreds of steps."""
+        if name not in self._views:
+            self._views[name] = self._batch.bind(name)
+        return self._views[name]
+
     @property
     def _outputs_at(self) -> slice:
         """The actuators of the outputs."""
@@ -295,7 +302,7 @@ class Reservoir:
         chunk: int,
     ) -> Iterator[Trajectory]:
         self._batch.expand("actuator_biasprm")[:, self._outputs_at, 0] = gate
-        self._batch.bind("ctrl")[:] = 0.0
+        self._bound("ctrl")[:] = 0.0
         first = self._adopted.first
         for start in range(0, total, chunk):
             stop = min(start + chunk, total)
@@ -311,7 +318,7 @@ class Reservoir:
     def _run(self, control: Array | None, steps: int, record: frozenset[str]) -> Trajectory:
         install.install_control()  # somebody may have taken it out since the last chunk
         batch = self._batch
-        before = {name: batch.bind(name).copy() for name in ("qpos", "qvel", "time")}
+        before = {name: self._bound(name).copy() for name in ("qpos", "qvel", "time")}
         states = record & {"qpos", "qvel"}
         with quiet_warnings():
             rows = batch.rollout(steps, control, _CTRL, ["sensordata", *states])
@@ -339,7 +346,7 @@ class Reservoir:
 
     def _check_alive(self, time_before: float, steps: int) -> None:
         """Raise if MuJoCo stopped early or a number is not finite."""
-        time, speeds = float(self._batch.bind("time")[0]), self._batch.bind("qvel")[0]
+        time, speeds = float(self._bound("time")[0]), self._bound("qvel")[0]
         done = round((time - time_before) / self.timestep)
         if done >= steps and np.isfinite(speeds).all():
             return
