@@ -254,6 +254,7 @@ print("alive")
 """
 
 
-def test_a_hostile_model_cannot_harm():
-    done = subprocess.run([sys.executable, "-c", HOSTILE], capture_output=True, text=True)
+def test_a_hostile_model_cannot_harm(tmp_path):  # MuJoCo writes a log where it runs
+    command = [sys.executable, "-c", HOSTILE]
+    done = subprocess.run(command, capture_output=True, text=True, cwd=tmp_path)
     assert done.stdout == "alive\n", done.stderr
