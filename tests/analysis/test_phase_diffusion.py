@@ -46,6 +46,7 @@ def exact_jitter(loop, cycle, noise):
     return np.sqrt(steps * kick**2 / (2 * AMPLITUDE**2 * rate**2)) / (2 * np.pi)
 
 
+@pytest.mark.slow
 def test_a_swing_between_two_springs_has_the_jitter_of_its_closed_form(swinging):
     """Of 40 measurements, and so has their spread the size of their standard errors."""
     loop, cycle = swinging

@@ -42,6 +42,7 @@ def child(folder, suffix, *prefix, limit=resource.RLIM_INFINITY):
     return done.stdout.splitlines(), done.stderr
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("suffix", [".mp4", ".gif"])
 def test_a_video_that_exceeds_a_limit_of_size(suffix, tmp_path):
     lines, _ = child(tmp_path, suffix)

@@ -75,6 +75,7 @@ def cluster():
         yield made
 
 
+@pytest.mark.slow
 def test_a_cluster_worker_that_is_killed_loses_nothing(tmp_path, alone, cluster):
     def kill():
         worker = next(iter(cluster.workers.values()))

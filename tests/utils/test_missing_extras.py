@@ -18,6 +18,7 @@ except MissingExtraError as error:
 STUDY = "from mcmj.search.study import Study; Study('s', {}, {'x': 1}, 0, startup=1, maximise=True)"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("package", "extra", "use"),
     [
