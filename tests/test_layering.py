@@ -60,6 +60,7 @@ MUJOCO = {
     "simulation.interactive",
     "simulation.mujoco_engine",
     "simulation.reservoir",
+    "simulation.reservoir_file",
     "simulation.simulation",
     "utils.quiet",
 }

@@ -59,11 +59,11 @@ def check_drive(
     if constant:
         forces = as_array("forces", forces, (body.n_nodes,))[None]
     arrays = {
-        "inputs": _series("inputs", inputs, body.n_inputs, copies),
-        "offset": _series("offset", offset, body.n_outputs, copies),
-        "forces": _series("forces", forces, body.n_nodes, copies),
+        "inputs": series("inputs", inputs, body.n_inputs, copies),
+        "offset": series("offset", offset, body.n_outputs, copies),
+        "forces": series("forces", forces, body.n_nodes, copies),
     }
-    total = _common_length(steps, arrays, constant=constant)
+    total = common_length(steps, arrays, constant=constant)
     if gate is None:
         gate = np.full(body.n_outputs, float(closed))
     elif np.asarray(gate).ndim == 0:
@@ -71,7 +71,8 @@ def check_drive(
     return Drive(steps=total, gate=as_array("gate", gate, (body.n_outputs,)), **arrays)
 
 
-def _series(name: str, value: object, width: int, copies: int | None) -> Array | None:
+def series(name: str, value: object, width: int, copies: int | None = None) -> Array | None:
+    """What varies over time as an array (..., T, width), checked; None stays None."""
     if value is None:
         return None
     if copies is not None and np.asarray(value).ndim == 3:
@@ -79,7 +80,17 @@ def _series(name: str, value: object, width: int, copies: int | None) -> Array |
     return as_array(name, value, (None, width))
 
 
-def _common_length(steps: int | None, arrays: dict[str, Array | None], *, constant: bool) -> int:
+def common_length(
+    steps: int | None, arrays: dict[str, Array | None], *, constant: bool = False
+) -> int:
+    """T: `steps`, or the length of what varies over time.
+
+    Args:
+        constant: "forces" do not vary.
+
+    Raises:
+        InvalidArgumentError: lengths that disagree, or no length at all.
+    """
     lengths = {name: array.shape[-2] for name, array in arrays.items() if array is not None}
     if constant or (lengths.get("forces") == 1 and (steps is not None or len(lengths) > 1)):
         del lengths["forces"]

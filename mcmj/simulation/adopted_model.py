@@ -4,7 +4,6 @@ MjSpec keeps what the model is; what is added holds no force and changes no moti
 gain 0 (a channel each, see `mcmj.core.callbacks.reservoir_law`), sensors, one custom numeric.
 """
 
-import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
@@ -20,7 +19,7 @@ from mcmj.core.callbacks.reservoir_law import NUMERIC, Law, block
 from mcmj.core.integrators import integrator_named
 from mcmj.utils.errors import BodyFileError, InvalidArgumentError, UnknownNameError
 from mcmj.utils.quiet import quiet_warnings
-from mcmj.utils.validation import Array, require_count, require_number
+from mcmj.utils.validation import require_count, require_number
 
 Model: TypeAlias = str | PathLike[str] | mujoco.MjSpec
 Channels: TypeAlias = Sequence[str] | Mapping[str, Mapping[str, float]]
@@ -35,7 +34,6 @@ ADDABLE = {
     "actuatorvel": ("actuator", mujoco.mjtObj.mjOBJ_ACTUATOR),
     "actuatorfrc": ("actuator", mujoco.mjtObj.mjOBJ_ACTUATOR),
 }
-SETTINGS = "mcmj_reservoir_settings"  # custom text, exact: sensors, channels, inputs, readout
 OURS = "mcmj:"  # begins the names of what is added
 _COPIED = (
     "type",
@@ -56,6 +54,7 @@ class AdoptedModel:
 
     Attributes:
         spec, model: the model with what was added, to be written and to be stepped.
+        asked: the arguments of `adopt` but the spec, all names in full, as JSON types.
         signals: (n_signals,) where they stand in sensordata, never delayed.
         late: (n_signals,) bool: MuJoCo computes it after actuation, so the law hears the value
             of the step before.
@@ -67,6 +66,7 @@ class AdoptedModel:
 
     spec: mujoco.MjSpec
     model: mujoco.MjModel
+    asked: dict[str, Any]
     signals: npt.NDArray[np.int64]
     late: npt.NDArray[np.bool_]
     signal_names: tuple[str, ...]
@@ -131,52 +131,11 @@ def adopt(
     """
     require_count("feedback_delay", feedback_delay, 0)
     heard = _resolved_sensors(spec, sensors)
-    drives: list[list[dict[str, float]]] = []
-    names: list[tuple[str, ...]] = []
-    for kind, given in (("channel", channels), ("input", inputs)):
-        found = _resolved_channels(spec, kind, given)
-        names.append(tuple(found))
-        drives.append(list(found.values()))
-    if not names[0]:
+    outputs = _resolved_channels(spec, "channel", channels)
+    if not outputs:
         raise InvalidArgumentError("channels", "at least one actuator", channels)
-    adopted = _with_channels(spec, heard, names, [*drives[0], *drives[1]], feedback_delay)
-    gains = [dict(zip(names[kind], drives[kind], strict=True)) for kind in range(2)]
-    account = {"sensors": heard, "channels": gains[0], "inputs": gains[1], "delay": feedback_delay}
-    adopted.spec.add_text(name=SETTINGS, data=json.dumps(account))
-    return adopted
-
-
-def stored(model: Model) -> tuple[mujoco.MjSpec, dict[str, Any], Array | None]:
-    """What a file of a trained reservoir holds.
-
-    Returns:
-        the model as it was before it was adopted, the other arguments of `adopt`, and the
-        readout
-        (n_signals + 1, n_channels), or None.
-
-    Raises:
-        BodyFileError: no such file, not a model, or not that of a reservoir.
-    """
-    spec = read_spec(model)
-    texts = {text.name: text for text in spec.texts}
-    numbers = {numeric.name: numeric for numeric in spec.numerics}
-    try:
-        account = json.loads(texts[SETTINGS].data)
-        given = {
-            "sensors": list(account["sensors"]),
-            "channels": dict(account["channels"]),
-            "inputs": dict(account["inputs"]),
-            "feedback_delay": account["delay"],
-        }
-        kept = account["w_out"]
-        w_out = None if kept is None else np.array(kept, np.float64)
-        law = numbers[NUMERIC]
-    except (KeyError, ValueError, TypeError, AttributeError) as error:
-        raise BodyFileError(f"model: not the file of a reservoir ({error})") from error
-    added = [one for one in (*spec.actuators, *spec.sensors) if one.name.startswith(OURS)]
-    for element in (*added, texts[SETTINGS], law):
-        spec.delete(element)
-    return spec, given, w_out
+    driven = _resolved_channels(spec, "input", inputs)
+    return _with_channels(spec, heard, outputs, driven, feedback_delay)
 
 
 def _resolved_sensors(spec: mujoco.MjSpec, sensors: str | Sequence[str]) -> list[str]:
@@ -188,13 +147,18 @@ def _resolved_sensors(spec: mujoco.MjSpec, sensors: str | Sequence[str]) -> list
             matches = [_added(spec, kind, name) for name in _objects(spec, kind, objects)]
         else:
             known = [sensor.name for sensor in spec.sensors if sensor.name]
-            matches = [name for name in known if fnmatchcase(name, pattern)]
+            matches = _matching(pattern, known)
             if not matches:
                 raise UnknownNameError("sensor", pattern, [*known, *(f"{k}:*" for k in ADDABLE)])
         found += [name for name in matches if name not in found]
     if not found:
         raise InvalidArgumentError("sensors", "at least one sensor", sensors)
     return found
+
+
+def _matching(pattern: str, known: list[str]) -> list[str]:
+    """Known names that a pattern matches; one that is a name itself, brackets and all, is that."""
+    return [pattern] if pattern in known else [n for n in known if fnmatchcase(n, pattern)]
 
 
 def _objects(spec: mujoco.MjSpec, kind: str, pattern: str) -> list[str]:
@@ -204,7 +168,7 @@ def _objects(spec: mujoco.MjSpec, kind: str, pattern: str) -> list[str]:
     if what == "joint":
         scalar = (mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_SLIDE)
         known = [joint.name for joint in spec.joints if joint.name and joint.type in scalar]
-    matches = [name for name in known if fnmatchcase(name, pattern)]
+    matches = _matching(pattern, known)
     if not matches:
         raise UnknownNameError(f"{what} (of sensor {kind})", pattern, known)
     return matches
@@ -233,7 +197,7 @@ def _resolved_channels(
         return {name: dict(gains) for name, gains in given.items()}
     found: dict[str, dict[str, float]] = {}
     for pattern in [given] if isinstance(given, str) else given:
-        matches = [name for name in known if fnmatchcase(name, pattern)]
+        matches = _matching(pattern, known)
         if not matches:
             raise UnknownNameError(f"actuator of {kind}s", pattern, known)
         found |= {name: {name: 1.0} for name in matches}
@@ -243,8 +207,8 @@ def _resolved_channels(
 def _with_channels(
     spec: mujoco.MjSpec,
     heard: list[str],
-    names: list[tuple[str, ...]],
-    drives: list[dict[str, float]],
+    outputs: dict[str, dict[str, float]],
+    inputs: dict[str, dict[str, float]],
     feedback_delay: int,
 ) -> AdoptedModel:
     if NUMERIC in [numeric.name for numeric in spec.numerics]:
@@ -258,11 +222,11 @@ def _with_channels(
     slow = [place for place, is_late in zip(read, late, strict=True) if is_late]
     law_drives = [
         (actuators[name], channel, gain)
-        for channel, gains in enumerate(drives)
+        for channel, gains in enumerate([*outputs.values(), *inputs.values()])
         for name, gain in gains.items()
     ]
     law = Law(
-        outputs=len(names[0]),
+        outputs=len(outputs),
         first=bare.nu,
         clock=int(bare.sensor(f"{OURS}time").adr[0]),
         signals=len(read),
@@ -274,13 +238,27 @@ def _with_channels(
     numbers = block(law, read, slow, law_drives, delay)
     spec.nuserdata = bare.nuserdata + (1 + int(late.sum()) if late.any() else 0)
     spec.nuser_actuator = max(bare.nuser_actuator, len(signals) + 1)
-    for kind, name in [*(("output", n) for n in names[0]), *(("input", n) for n in names[1])]:
+    for kind, name in [*(("output", n) for n in outputs), *(("input", n) for n in inputs)]:
         _add_channel(spec, f"{OURS}{kind}:{name}", len(signals) + 1)
     spec.add_numeric(name=NUMERIC, data=numbers, size=len(numbers))
+    asked = {
+        "sensors": heard,
+        "channels": outputs,
+        "inputs": inputs,
+        "feedback_delay": feedback_delay,
+    }
     return AdoptedModel(
-        spec, _compiled(spec), signals, late, signal_names, names[0], names[1], bare.nu,
-        bare.nuserdata,
-    )  # fmt: skip
+        spec=spec,
+        model=_compiled(spec),
+        asked=asked,
+        signals=signals,
+        late=late,
+        signal_names=signal_names,
+        channel_names=tuple(outputs),
+        input_names=tuple(inputs),
+        first=bare.nu,
+        memory=bare.nuserdata,
+    )
 
 
 def _add_channel(spec: mujoco.MjSpec, name: str, width: int) -> None:

@@ -7,7 +7,6 @@ only (forces, accelerations) is heard as it was one step before; `signals` show 
 """
 
 import hashlib
-import json
 from collections.abc import Iterator, Sequence
 from functools import cached_property
 from typing import Any
@@ -18,16 +17,11 @@ from mujoco.batch import Batch
 
 from mcmj.core.callbacks import install
 from mcmj.core.readout import Readout, readout_rows
+from mcmj.core.rollout_arguments import common_length, series
 from mcmj.core.trajectory import Trajectory, join
-from mcmj.simulation.adopted_model import (
-    OURS,
-    SETTINGS,
-    Channels,
-    Model,
-    adopt,
-    read_spec,
-    stored,
-)
+from mcmj.simulation.adopted_model import Channels, Model, adopt, read_spec
+from mcmj.simulation.one_drive import OneDrive
+from mcmj.simulation.reservoir_file import read_reservoir, write_reservoir
 from mcmj.utils.errors import DivergenceError, InvalidArgumentError, UnknownNameError
 from mcmj.utils.quiet import quiet_warnings
 from mcmj.utils.validation import MOST_STEPS, Array, as_array, require_count
@@ -38,7 +32,7 @@ _CTRL = mujoco.mjtState.mjSTATE_CTRL.value
 _NO_STAGE = mujoco.mjtStage.mjSTAGE_NONE.value
 
 
-class Reservoir:
+class Reservoir(OneDrive):
     """A MuJoCo model as a reservoir; its state carries over from one rollout to the next.
 
     Args:
@@ -88,8 +82,8 @@ class Reservoir:
         Raises:
             BodyFileError: no such file, or not that of a reservoir.
         """
-        spec, given, w_out = stored(model)
-        return cls(spec, **given, w_out=w_out)
+        spec, asked, w_out = read_reservoir(model)
+        return cls(spec, **asked, w_out=w_out)
 
     def to_mjcf(self) -> str:
         """The model as MJCF, with sensors, channels and readout: one file that is complete.
@@ -97,19 +91,7 @@ class Reservoir:
         Without mcmj it is the model with an open loop; MuJoCo's own viewer shows it. The readout
         is exact; the rest has the six digits that MuJoCo's writer keeps.
         """
-        spec = self._adopted.spec.copy()
-        rows, gate = self.readout.rows, float(self._w_out is not None)
-        for c, name in enumerate(self.channel_names):
-            actuator = spec.actuator(f"{OURS}output:{name}")
-            actuator.userdata = rows[:, c]
-            parameters = actuator.biasprm
-            parameters[0] = gate
-        kept = None if self._w_out is None else rows.tolist()
-        text = next(text for text in spec.texts if text.name == SETTINGS)
-        text.data = json.dumps({**json.loads(text.data), "w_out": kept})
-        with quiet_warnings():
-            spec.compile()
-            return str(spec.to_xml())
+        return write_reservoir(self._adopted, None if self._w_out is None else self.readout)
 
     @property
     def model(self) -> mujoco.MjModel:
@@ -175,20 +157,9 @@ class Reservoir:
 
     # --- state -------------------------------------------------------------------------------
 
-    def reset(self, keyframe: int | str | None = None) -> None:
-        """Back to the model's start, or to a keyframe of it, at time 0.
-
-        Raises:
-            InvalidArgumentError: no such keyframe.
-        """
+    def reset(self) -> None:
+        """Back to the model's start, time 0."""
         self._batch.reset(stage=_NO_STAGE)
-        if keyframe is not None:
-            try:
-                key = self.model.key(keyframe)
-            except (KeyError, IndexError) as error:
-                raise InvalidArgumentError("keyframe", "one of the model", keyframe) from error
-            for name in ("qpos", "qvel", "act"):
-                self._bound(name)[:] = getattr(key, name)
         self.steps_done = 0
         self._heard_late = np.zeros(int(self._adopted.late.sum()))
 
@@ -225,9 +196,10 @@ class Reservoir:
 
     @cached_property
     def _fingerprint(self) -> float:
-        """48 bits of a hash of the model, exact as a float."""
-        xml = self._adopted.spec.to_xml().encode()
-        return float(int.from_bytes(hashlib.blake2b(xml, digest_size=6).digest()))
+        """48 bits of a hash of the compiled model, exact as a float."""
+        binary = np.zeros(mujoco.mj_sizeModel(self.model), np.uint8)
+        mujoco.mj_saveModel(self.model, None, binary)
+        return float(int.from_bytes(hashlib.blake2b(binary.tobytes(), digest_size=6).digest()))
 
     # --- stepping ----------------------------------------------------------------------------
 
@@ -265,25 +237,27 @@ class Reservoir:
         record: Sequence[str] = ("signals", "outputs"),
         chunk: int = CHUNK,
     ) -> Iterator[Trajectory]:
-        """As `rollout`, yielding chunks: memory stays flat however long the run is."""
+        """As `rollout`, yielding chunks: memory stays flat however long the run is.
+
+        Raises:
+            McmjError: another stream or rollout of this reservoir is not at its end.
+        """
         for name in record:
-            if name not in (*RECORDABLE, "lengths"):
+            if name not in (*RECORDABLE, "lengths"):  # which lessons call signals
                 raise UnknownNameError("record", name, RECORDABLE)
         require_count("chunk", chunk, 1, MOST_STEPS)
-        series = {"inputs": (inputs, len(self.input_names)), "offset": (offset, self.n_outputs)}
         arrays = {
-            name: as_array(name, value, (None, width))
-            for name, (value, width) in series.items()
-            if value is not None
+            "inputs": series("inputs", inputs, len(self.input_names)),
+            "offset": series("offset", offset, self.n_outputs),
         }
-        total = _common_length(steps, arrays)
+        total = common_length(steps, arrays)
         if gate is None or np.asarray(gate).ndim == 0:
             gate = np.full(self.n_outputs, self._w_out is not None if gate is None else gate)
         gates = as_array("gate", gate, (self.n_outputs,))
         return self._chunks(total, arrays, gates, frozenset(record), chunk)
 
     def _bound(self, name: str) -> Array:
-        """A view (1, n) of the simulation's data; making one costs as much as hundreds of steps."""
+        """A view (1, n) of the simulation's data, made once: making one is slow."""
         if name not in self._views:
             self._views[name] = self._batch.bind(name)
         return self._views[name]
@@ -296,24 +270,26 @@ class Reservoir:
     def _chunks(
         self,
         total: int,
-        arrays: dict[str, Array],
+        arrays: dict[str, Array | None],
         gate: Array,
         record: frozenset[str],
         chunk: int,
     ) -> Iterator[Trajectory]:
-        self._batch.expand("actuator_biasprm")[:, self._outputs_at, 0] = gate
-        self._bound("ctrl")[:] = 0.0
-        first = self._adopted.first
-        for start in range(0, total, chunk):
-            stop = min(start + chunk, total)
-            control = None
-            if arrays:
-                control = np.zeros((stop - start, self.model.nu))
-                for name, at in (("offset", first), ("inputs", first + self.n_outputs)):
-                    if name in arrays:
-                        rows = arrays[name][start:stop]
-                        control[:, at : at + rows.shape[1]] = rows
-            yield self._run(control, stop - start, record)
+        with self._only_drive():
+            self._batch.expand("actuator_biasprm")[:, self._outputs_at, 0] = gate
+            self._bound("ctrl")[:] = 0.0
+            for start in range(0, total, chunk):
+                stop = min(start + chunk, total)
+                yield self._run(self._control(arrays, start, stop), stop - start, record)
+
+    def _control(self, arrays: dict[str, Array | None], start: int, stop: int) -> Array | None:
+        """ctrl (steps, nu) of the channels; None if nothing varies."""
+        control, first = np.zeros((stop - start, self.model.nu)), self._adopted.first
+        for name, at in (("offset", first), ("inputs", first + self.n_outputs)):
+            rows = arrays[name]
+            if rows is not None:
+                control[:, at : at + rows.shape[1]] = rows[start:stop]
+        return control if any(rows is not None for rows in arrays.values()) else None
 
     def _run(self, control: Array | None, steps: int, record: frozenset[str]) -> Trajectory:
         install.install_control()  # somebody may have taken it out since the last chunk
@@ -360,17 +336,3 @@ class Reservoir:
             time=time,
             steps_done=done,
         )
-
-
-def _common_length(steps: int | None, arrays: dict[str, Array]) -> int:
-    lengths = {name: len(array) for name, array in arrays.items()}
-    if steps is None:
-        if not lengths:
-            expected = "a number of steps, or inputs or offset over time"
-            raise InvalidArgumentError("steps", expected, None)
-        steps = next(iter(lengths.values()))
-    require_count("steps", steps, 1, MOST_STEPS)
-    for name, length in lengths.items():
-        if length != steps:
-            raise InvalidArgumentError(name, f"{steps} rows, one a step", length)
-    return int(steps)

@@ -9,7 +9,6 @@ Two conventions hold under every integrator:
 
 import hashlib
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
 from dataclasses import fields, replace
 from functools import cached_property
 
@@ -26,8 +25,9 @@ from mcmj.core.trajectory import RECORDABLE, State, Trajectory, join
 from mcmj.simulation.damage import checked_cut, checked_masses
 from mcmj.simulation.engines import make_engine
 from mcmj.simulation.mujoco_engine import Engine
+from mcmj.simulation.one_drive import OneDrive
 from mcmj.simulation.stepsize.limit import warn_if_unstable
-from mcmj.utils.errors import DivergenceError, InvalidArgumentError, McmjError, UnknownNameError
+from mcmj.utils.errors import DivergenceError, InvalidArgumentError, UnknownNameError
 from mcmj.utils.validation import MOST_STEPS, Array, as_array, require_count
 
 CHUNK = 16384  # control steps at a time in C: 8 MB of lengths at 61 springs
@@ -35,7 +35,7 @@ CHUNK = 16384  # control steps at a time in C: 8 MB of lengths at 61 springs
 Hook = Callable[[float, Array], Array]
 
 
-class Simulation:
+class Simulation(OneDrive):
     """A body in MuJoCo; its state carries over from one rollout to the next.
 
     Args:
@@ -58,7 +58,6 @@ class Simulation:
     """
 
     _copies: int | None = None  # an ensemble's arrays have a leading axis
-    _driven = False  # a stream has begun and is not at its end
 
     def __init__(
         self,
@@ -279,20 +278,6 @@ class Simulation:
                 except DivergenceError as error:
                     raise error.after(start) from None
                 yield chunk_run
-
-    @contextmanager
-    def _only_drive(self) -> Iterator[None]:
-        """Refuse a second drive: the engine holds the gate of one."""
-        if self._driven:
-            raise McmjError(
-                "a stream or rollout of this simulation is not at its end: finish it or close it "
-                "(stream.close()), or use a simulation each"
-            )
-        self._driven = True
-        try:
-            yield
-        finally:
-            self._driven = False
 
     def _run(self, drive: Drive, record: frozenset[str], start: int, stop: int) -> Trajectory:
         done = self._engine.steps_done

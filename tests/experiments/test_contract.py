@@ -53,9 +53,13 @@ TINY = {
     "walk": "--parts walk --gaits trot --settle 2 --walking 3 --before 2 --after 2",
 }
 APART = {"reproduce", "view"}  # commands of commands, and a person; tested on their own
-TIMED = ("*second*", "*_ms", "*ratio*", "*cost*", "*speed*", "*memory*", "*start*", "*import*",
-         "growth*", "machine*", "*overhead*", "*us_per*", "*ns_per*",
-         "*_mb")  # fmt: skip
+TIMED = {  # metrics that are times, by path; all others are the same in every run
+    "benchmark": ("*",),
+    "guided": ("*per_second",),
+    "render": ("*_ms",),
+    "search": ("trials_per_second", "overhead_fraction"),
+    "speed_accuracy": ("*/us_per_simulated_second", "*/cost_ratio*"),
+}
 SLOW = dict.fromkeys(("benchmark", "certify", "input_driven", "success_rate"), pytest.mark.slow)
 BAD = {  # an option that the experiment must refuse by its name, where it is not --seed
     "render": ("--stills", "0"), "guided": ("--bodies", "0"), "search": ("--seeds", "0"),
@@ -101,11 +105,10 @@ def test_an_experiment_runs_is_deterministic_and_draws(name, tmp_path):
     assert one["scenario"] == name
     assert isinstance(one["seed"], int)
     found, again = numbers(one["metrics"]), numbers(two["metrics"])
-    assert found
-    assert any(np.isfinite(list(found.values())))
+    # null is what a run so short does not have: a period, a time of recovery
+    assert np.isfinite(list(found.values())).mean() > 0.5
     for path, value in found.items():
-        if not any(fnmatch(path.rpartition("/")[2], timed) or fnmatch(path[1:], timed)
-                   for timed in TIMED):  # fmt: skip
+        if not any(fnmatch(path[1:], timed) for timed in TIMED.get(name, ())):
             assert again[path] == value or (np.isnan(value) and np.isnan(again[path])), path
     pictures = list((tmp_path / "one").glob("*.png"))
     assert pictures
