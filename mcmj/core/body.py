@@ -106,6 +106,11 @@ class Body:
         return len(self.springs)
 
     @property
+    def n_forces(self) -> int:
+        """Number of forces of a rollout, one a node: N."""
+        return self.n_nodes
+
+    @property
     def n_inputs(self) -> int:
         """Number of input channels."""
         return int(self.w_in.shape[1])

@@ -8,12 +8,28 @@ Teacher forcing is g = 0 with offset = teacher + noise, the closed loop g = 1 wi
 """
 
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 
-from mcmj.core.body import Body
 from mcmj.utils.errors import InvalidArgumentError
 from mcmj.utils.validation import MOST_STEPS, Array, as_array, require_count
+
+
+class Driven(Protocol):
+    """What a rollout drives: a body, or any reservoir."""
+
+    @property
+    def n_inputs(self) -> int:
+        """Number of input channels."""
+
+    @property
+    def n_outputs(self) -> int:
+        """Number of feedback channels."""
+
+    @property
+    def n_forces(self) -> int:
+        """Number of forces: of nodes, or degrees of freedom."""
 
 
 @dataclass(frozen=True)
@@ -25,7 +41,9 @@ class Drive:
         inputs: (..., T, n_inputs).
         offset: (..., T, n_outputs), added to the fed-back outputs.
         gate: (n_outputs,): 1 closes a feedback channel, 0 opens it.
-        forces: (..., T, N) horizontal forces on the nodes [N]; T = 1 if constant.
+        forces: (..., T, n_forces) horizontal forces on a body's nodes [N], or what acts on the
+            degrees of freedom of a model [N or N m]; T = 1 if constant.
+        pushes: (n_bodies, 6) constant forces [N] and torques [N m] on a model's bodies.
     """
 
     steps: int
@@ -33,10 +51,11 @@ class Drive:
     offset: Array | None
     gate: Array
     forces: Array | None
+    pushes: Array | None = None
 
 
 def check_drive(
-    body: Body,
+    driven: Driven,
     *,
     steps: int | None,
     inputs: object = None,
@@ -57,18 +76,18 @@ def check_drive(
     """
     constant = forces is not None and np.asarray(forces).ndim == 1
     if constant:
-        forces = as_array("forces", forces, (body.n_nodes,))[None]
+        forces = as_array("forces", forces, (driven.n_forces,))[None]
     arrays = {
-        "inputs": series("inputs", inputs, body.n_inputs, copies),
-        "offset": series("offset", offset, body.n_outputs, copies),
-        "forces": series("forces", forces, body.n_nodes, copies),
+        "inputs": series("inputs", inputs, driven.n_inputs, copies),
+        "offset": series("offset", offset, driven.n_outputs, copies),
+        "forces": series("forces", forces, driven.n_forces, copies),
     }
     total = common_length(steps, arrays, constant=constant)
     if gate is None:
-        gate = np.full(body.n_outputs, float(closed))
+        gate = np.full(driven.n_outputs, float(closed))
     elif np.asarray(gate).ndim == 0:
-        gate = np.full(body.n_outputs, gate)
-    return Drive(steps=total, gate=as_array("gate", gate, (body.n_outputs,)), **arrays)
+        gate = np.full(driven.n_outputs, gate)
+    return Drive(steps=total, gate=as_array("gate", gate, (driven.n_outputs,)), **arrays)
 
 
 def series(name: str, value: object, width: int, copies: int | None = None) -> Array | None:

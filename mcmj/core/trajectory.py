@@ -10,8 +10,9 @@ from mcmj.utils.validation import Array
 
 TIME_AXIS = {
     "lengths": -2, "outputs": -2, "positions": -3, "velocities": -3, "qpos": -2, "qvel": -2,
+    "sensordata": -2,
 }  # fmt: skip
-RECORDABLE = ("lengths", "outputs", "positions", "velocities")  # of a body
+RECORDABLE = tuple(TIME_AXIS)
 
 
 @dataclass(frozen=True)
@@ -50,6 +51,7 @@ class Trajectory:
         outputs: (T, n_outputs), zeros without a readout.
         positions, velocities: (T, N, 2) [m], [m/s].
         qpos, qvel: (T, nq), (T, nv) of a model that is no Body.
+        sensordata: (T, nsensordata) all sensors of such a model, as MuJoCo computed them in step k.
         final_state: state after the last step.
     """
 
@@ -60,6 +62,7 @@ class Trajectory:
     velocities: Array | None = None
     qpos: Array | None = None
     qvel: Array | None = None
+    sensordata: Array | None = None
     final_state: State | None = field(default=None, repr=False)
 
     def __len__(self) -> int:
@@ -76,6 +79,7 @@ class Trajectory:
         Raises:
             UnknownNameError: it was not recorded.
         """
+        name = "lengths" if name == "signals" else name
         array: Array | None = getattr(self, name) if name in TIME_AXIS else None
         if array is None:
             recorded = [n for n in TIME_AXIS if getattr(self, n) is not None]

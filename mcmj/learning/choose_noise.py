@@ -12,7 +12,7 @@ import numpy as np
 from mcmj.learning.held_out import closed_loop_errors, held_out_starts
 from mcmj.learning.lessons import Teaching
 from mcmj.learning.teaching import Course, lessons_of
-from mcmj.simulation.simulation import Simulation
+from mcmj.simulation.reservoir import Reservoir
 from mcmj.targets.limit_cycles import Target
 from mcmj.utils.errors import DivergenceError
 from mcmj.utils.validation import Array, require_count
@@ -45,7 +45,7 @@ class Selection:
 
 
 def select_teaching(
-    simulation: Simulation,
+    simulation: Reservoir,
     target: Target,
     teaching: Teaching,
     seed: int,

@@ -4,7 +4,7 @@ import numpy as np
 
 from mcmj.learning.regression import Fit
 from mcmj.metrics import orbits
-from mcmj.simulation.simulation import Simulation
+from mcmj.simulation.reservoir import Reservoir
 from mcmj.targets.limit_cycles import Target
 from mcmj.utils.checkpoint import Checkpoint
 from mcmj.utils.errors import InvalidArgumentError
@@ -14,7 +14,7 @@ from mcmj.utils.validation import Array, require_number
 WINDOW = 50.0  # s
 
 
-def resume(simulation: Simulation, checkpoint: Checkpoint) -> tuple[Array, Fit | None] | None:
+def resume(simulation: Reservoir, checkpoint: Checkpoint) -> tuple[Array, Fit | None] | None:
     """Bring a simulation to where its checkpoint stands, if there is one.
 
     Returns:
@@ -37,7 +37,7 @@ def resume(simulation: Simulation, checkpoint: Checkpoint) -> tuple[Array, Fit |
 
 
 def free_run(
-    simulation: Simulation,
+    simulation: Reservoir,
     steps: int,
     *,
     inputs: Array | None = None,
@@ -58,7 +58,7 @@ def free_run(
         InvalidArgumentError: the checkpoint does not hold what is done.
         OutputError: the disk does not take it.
     """
-    outputs = np.empty((steps, simulation.body.n_outputs))
+    outputs = np.empty((steps, simulation.n_outputs))
     at = 0 if done is None else len(done)
     if checkpoint is not None and checkpoint.rows != at:
         raise InvalidArgumentError("checkpoint", f"one that holds {at} rows", checkpoint.rows)
@@ -78,7 +78,7 @@ def free_run(
     return outputs
 
 
-def _state(simulation: Simulation, fit: Fit | None) -> dict[str, Array]:
+def _state(simulation: Reservoir, fit: Fit | None) -> dict[str, Array]:
     w_out = simulation.w_out
     assert w_out is not None
     arrays = {"snapshot": simulation.snapshot(), "w_out": w_out}

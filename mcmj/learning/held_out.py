@@ -6,7 +6,7 @@ import numpy as np
 
 from mcmj.learning.lessons import Teaching
 from mcmj.metrics.orbits import orbit_error
-from mcmj.simulation.simulation import Simulation
+from mcmj.simulation.reservoir import Reservoir
 from mcmj.targets.limit_cycles import Target
 from mcmj.utils.errors import DivergenceError
 from mcmj.utils.seeds import stream
@@ -14,7 +14,7 @@ from mcmj.utils.validation import Array, require_count
 
 
 def held_out_starts(
-    simulation: Simulation, target: Target, teaching: Teaching, seed: int, count: int
+    simulation: Reservoir, target: Target, teaching: Teaching, seed: int, count: int
 ) -> list[Array]:
     """Snapshots from which to close the loop: other noise than in teaching, other phases.
 
@@ -40,7 +40,7 @@ def held_out_starts(
 
 
 def closed_loop_errors(
-    simulation: Simulation,
+    simulation: Reservoir,
     w_out: Array,
     starts: Sequence[Array],
     target: Target,

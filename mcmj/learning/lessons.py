@@ -4,11 +4,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from mcmj.simulation.reservoir import Reservoir
-from mcmj.simulation.simulation import Simulation
 from mcmj.utils.errors import InvalidArgumentError
 from mcmj.utils.validation import Array, require_count, require_duration, require_number
 
-Teachable = Simulation | Reservoir
 Signal = Callable[[Array], Array]  # times (T,) [s] -> (T, n)
 
 
@@ -105,7 +103,7 @@ class Lesson:
         """Whether it begins where the simulation is not."""
         return self.from_rest or self.start is not None
 
-    def begin(self, simulation: Teachable) -> None:
+    def begin(self, simulation: Reservoir) -> None:
         """Put a simulation where the lesson begins."""
         if self.from_rest:
             simulation.reset()

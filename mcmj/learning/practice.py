@@ -14,10 +14,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from mcmj.learning.lessons import Lesson, Teachable
+from mcmj.learning.lessons import Lesson
 from mcmj.learning.regression import Fit
 from mcmj.learning.teaching import Course
 from mcmj.metrics import orbits
+from mcmj.simulation.reservoir import Reservoir
 from mcmj.targets.limit_cycles import Target
 from mcmj.utils.errors import DivergenceError, InvalidArgumentError
 from mcmj.utils.progress import OnSteps
@@ -158,7 +159,7 @@ def _try_lesson(course: Course, lesson: Lesson, times: int, on_steps: OnSteps) -
 
 
 def _trial(
-    simulation: Teachable, practice: Practice, exercise: Exercise, on_steps: OnSteps
+    simulation: Reservoir, practice: Practice, exercise: Exercise, on_steps: OnSteps
 ) -> float:
     """Error at the end of a free run from a start; the simulation stays as it was."""
     before, step, lesson = simulation.snapshot(), simulation.timestep, exercise.lesson
@@ -175,7 +176,7 @@ def _trial(
         on_steps(total)
 
 
-def _inputs(simulation: Teachable, lesson: Lesson, steps: int) -> Array | None:
+def _inputs(simulation: Reservoir, lesson: Lesson, steps: int) -> Array | None:
     """The lesson's inputs (steps, n_inputs) from the simulation's time on."""
     first = round(simulation.time / simulation.timestep)
     times = simulation.timestep * np.arange(first, first + steps, dtype=np.float64)

@@ -5,9 +5,9 @@ from copy import copy
 
 import numpy as np
 
-from mcmj.learning.lessons import Lesson, Teachable, Teaching
+from mcmj.learning.lessons import Lesson, Teaching
 from mcmj.learning.regression import Fit, Regression
-from mcmj.simulation.simulation import CHUNK
+from mcmj.simulation.reservoir import CHUNK, Reservoir
 from mcmj.targets.limit_cycles import Target
 from mcmj.utils.errors import InvalidArgumentError
 from mcmj.utils.progress import OnSteps
@@ -16,7 +16,7 @@ from mcmj.utils.validation import Array
 
 
 def teach(
-    simulation: Teachable,
+    simulation: Reservoir,
     target: Target,
     teaching: Teaching,
     seed: int,
@@ -42,7 +42,7 @@ def teach(
 
 
 def teach_lessons(
-    simulation: Teachable,
+    simulation: Reservoir,
     lessons: Iterable[Lesson],
     teaching: Teaching,
     seed: int,
@@ -81,7 +81,7 @@ class Course:
         seed: of the noise streams.
     """
 
-    def __init__(self, simulation: Teachable, teaching: Teaching, seed: int) -> None:
+    def __init__(self, simulation: Reservoir, teaching: Teaching, seed: int) -> None:
         self.simulation, self._teaching = simulation, teaching
         self._regression = Regression(bias=teaching.bias)
         self._noise = stream(seed, "teacher_noise")
@@ -161,7 +161,7 @@ class Course:
 
 
 def synchronise(
-    simulation: Teachable, target: Target, duration: float, inputs: object = None
+    simulation: Reservoir, target: Target, duration: float, inputs: object = None
 ) -> None:
     """Bring a body onto the target by clean teacher forcing, without learning.
 

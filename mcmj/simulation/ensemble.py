@@ -1,16 +1,10 @@
 """Copies of one body on several threads: many readouts, inputs or kicks in one rollout."""
 
-import numpy as np
-
 from mcmj.core.body import Body
 from mcmj.core.callbacks.spring_laws import SpringLaw
 from mcmj.core.integrators import DEFAULT_INTEGRATOR
 from mcmj.core.options import Options
-from mcmj.core.readout import Readout, is_pair
-from mcmj.simulation.engines import make_engine
 from mcmj.simulation.simulation import Simulation
-from mcmj.simulation.stepsize.limit import warn_if_unstable
-from mcmj.utils.validation import Array, as_array
 
 
 class Ensemble(Simulation):
@@ -42,19 +36,4 @@ class Ensemble(Simulation):
         engine: str = "mujoco",
     ) -> None:
         options = Options(timestep, integrator, springs, feedback_delay, substeps, engine)
-        self._engine = make_engine(body, options, copies=copies, threads=threads)
-        warn_if_unstable(body, options)
-        self._copies = copies
-        self.set_readout(w_out)
-
-    def _checked_readout(self, w_out: object) -> Array:
-        one = isinstance(w_out, Readout) or is_pair(w_out)
-        if one or np.asarray(w_out).ndim != 3:
-            return super()._checked_readout(w_out)
-        readouts = as_array("w_out", w_out, (self._copies, None, self.body.n_outputs))
-        for readout in readouts[:1]:  # all have the same shape
-            super()._checked_readout(readout)
-        return readouts
-
-    def _public(self, array: Array) -> Array:
-        return array
+        self._begin_body(body, options, w_out, copies, threads)

@@ -2,11 +2,11 @@
 
 import numpy as np
 
-from mcmj.simulation.simulation import CHUNK, Simulation
+from mcmj.simulation.reservoir import CHUNK, Reservoir
 from mcmj.utils.validation import Array, require_count
 
 
-def held_states(simulation: Simulation, symbols: Array, hold: int) -> Array:
+def held_states(simulation: Reservoir, symbols: Array, hold: int) -> Array:
     """Lengths (..., M, L) [m] at the start of the last step of each symbol.
 
     Args:

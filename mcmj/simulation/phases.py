@@ -7,22 +7,21 @@ channel c pushes with g_c (w_c . lengths) + o_c(t), the law of a rollout; a phas
 and o are (section 6.1.1 of Hauser et al. 2012 for the perturbations).
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import KW_ONLY, dataclass
 
 import numpy as np
 import numpy.typing as npt
 
-from mcmj.core.body import Body
-from mcmj.core.readout import checked_readout
-from mcmj.simulation.damage import checked_cut, checked_masses
+from mcmj.simulation.reservoir import Reservoir
 from mcmj.utils.errors import InvalidArgumentError
 from mcmj.utils.validation import as_array, require_count, require_duration, require_number
 
 
 @dataclass(frozen=True)
 class RandomForces:
-    """Horizontal forces on all nodes, uniform in [-scale, scale] [N], drawn once a phase."""
+    """Forces uniform in [-scale, scale], drawn once a phase: horizontal ones on all nodes [N], or
+    on all degrees of freedom of a model [N or N m]."""
 
     scale: float
 
@@ -40,12 +39,14 @@ class Phase:
         offset: (n_outputs,) constant, added to the fed-back outputs.
         freeze: channels that go on feeding back what they fed back last; in a schedule's first
             phase, the output of that moment. They take no offset.
-        forces: (N,) constant horizontal forces on the nodes [N], or RandomForces.
-        length_noise: standard deviation of white noise, new every step, on the lengths that
-            the readout sees [m].
+        forces: constant, as for a rollout: (n_forces,), or {body: (3,)} of a model; or
+            RandomForces.
+        length_noise: standard deviation of white noise, new every step, on the signals that
+            the readout hears; lengths of a body [m].
         w_out: readout to switch to, for this phase and all after it.
-        cut: springs that break: without force in this phase and ever after.
-        masses: (N,) of the nodes from this phase on [kg].
+        cut: springs that break, by number, or tendons of a model by name: without force in this
+            phase and ever after.
+        masses: (N,) of the nodes, or {body: mass} of a model, from this phase on [kg].
         name: for figures and tables.
     """
 
@@ -54,27 +55,27 @@ class Phase:
     gate: npt.ArrayLike | None = None
     offset: npt.ArrayLike | None = None
     freeze: tuple[int, ...] = ()
-    forces: npt.ArrayLike | RandomForces | None = None
+    forces: npt.ArrayLike | Mapping[str, npt.ArrayLike] | RandomForces | None = None
     length_noise: float = 0.0
     w_out: npt.ArrayLike | None = None
-    cut: tuple[int, ...] = ()
-    masses: npt.ArrayLike | None = None
+    cut: tuple[int, ...] | tuple[str, ...] = ()
+    masses: npt.ArrayLike | Mapping[str, float] | None = None
     name: str = ""
 
     def __post_init__(self) -> None:
         require_duration("duration", self.duration)
         require_number("length_noise", self.length_noise, 0.0)
         for name in ("freeze", "cut"):
-            numbers = getattr(self, name)
-            if not isinstance(numbers, Sequence):
-                raise InvalidArgumentError(name, "a tuple of numbers", repr(numbers))
-            for number in numbers:
-                require_count(name, number, 0)
-        for name in ("offset", "masses"):
-            if getattr(self, name) is not None:
-                as_array(name, getattr(self, name), (None,))
-        if self.forces is not None and not isinstance(self.forces, RandomForces):
-            as_array("forces", self.forces, (None,))
+            items = getattr(self, name)
+            if not isinstance(items, Sequence) or isinstance(items, str):
+                raise InvalidArgumentError(name, "a tuple of numbers", repr(items))
+            for item in items:
+                if name == "freeze" or not isinstance(item, str):
+                    require_count(name, item, 0)
+        for name in ("offset", "masses", "forces"):
+            value = getattr(self, name)
+            if value is not None and not isinstance(value, Mapping | RandomForces):
+                as_array(name, value, (None,))
         if self.w_out is not None:
             as_array("w_out", self.w_out, (None, None))
         if self.gate is not None:
@@ -112,30 +113,28 @@ class Schedule:
             raise InvalidArgumentError("duration", f"at least a step of {timestep:g} s", self)
         return counts
 
-    def check(self, body: Body, timestep: float) -> None:
-        """Check every phase against a body, before anything runs.
+    def check(self, reservoir: Reservoir) -> None:
+        """Check every phase against a body or model, before anything runs.
 
         Raises:
-            InvalidArgumentError: a shape, channel or spring that the body does not have.
+            InvalidArgumentError, UnknownNameError: a shape, channel, spring or name that it does
+                not have.
         """
-        self.steps(timestep)
+        self.steps(reservoir.timestep)
+        n_outputs, n_forces = reservoir.n_outputs, reservoir.n_forces
         for phase in self.phases:
-            checked_cut(body, phase.cut)
-            if phase.masses is not None:
-                checked_masses(body, phase.masses)
+            reservoir.check_alteration(phase.cut, phase.masses)
             if phase.w_out is not None:
-                checked_readout(body, phase.w_out)
-            if phase.forces is not None and not isinstance(phase.forces, RandomForces):
-                as_array("forces", phase.forces, (body.n_nodes,))
+                reservoir.checked_readout(phase.w_out)
+            if phase.forces is not None and not isinstance(phase.forces, Mapping | RandomForces):
+                as_array("forces", phase.forces, (n_forces,))
             if phase.offset is not None:
-                as_array("offset", phase.offset, (body.n_outputs,))
+                as_array("offset", phase.offset, (n_outputs,))
             if np.ndim(0.0 if phase.gate is None else phase.gate):
-                as_array("gate", phase.gate, (body.n_outputs,))
+                as_array("gate", phase.gate, (n_outputs,))
             for channel in phase.freeze:
-                if channel >= body.n_outputs:
-                    raise InvalidArgumentError(
-                        "freeze", f"channels 0 to {body.n_outputs - 1}", channel
-                    )
+                if channel >= n_outputs:
+                    raise InvalidArgumentError("freeze", f"channels 0 to {n_outputs - 1}", channel)
                 if phase.offset is not None and np.asarray(phase.offset)[channel] != 0.0:
                     raise InvalidArgumentError("offset", f"0 for the frozen channel {channel}",
                                                phase.offset)  # fmt: skip

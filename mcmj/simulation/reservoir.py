@@ -4,39 +4,42 @@
 
 s(k) are the sensors at the start of step k, also under RK4. What MuJoCo computes after actuation
 only (forces, accelerations) is heard as it was one step before; `signals` show what was heard.
+Inputs, offset, forces and the fed-back outputs are held over the step, also inside the stages
+of RK4.
 """
 
 import hashlib
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from functools import cached_property
-from typing import Any
+from typing import Any, ClassVar, Self
 
 import mujoco
 import numpy as np
-from mujoco.batch import Batch
 
-from mcmj.core.callbacks import install
-from mcmj.core.readout import Readout, readout_rows
-from mcmj.core.rollout_arguments import common_length, series
+from mcmj.core.readout import Readout, is_pair, readout_rows
+from mcmj.core.rollout_arguments import Drive, check_drive
 from mcmj.core.trajectory import Trajectory, join
-from mcmj.simulation.adopted_model import Channels, Model, adopt, read_spec
+from mcmj.simulation.damage import check_model_damage
+from mcmj.simulation.engines import Engine
+from mcmj.simulation.model_engine import ModelEngine
+from mcmj.simulation.models.adopt import Model, adopt, read_spec
+from mcmj.simulation.models.names import Channels
+from mcmj.simulation.models.reservoir_file import read_reservoir, write_reservoir
 from mcmj.simulation.one_drive import OneDrive
-from mcmj.simulation.reservoir_file import read_reservoir, write_reservoir
 from mcmj.utils.errors import DivergenceError, InvalidArgumentError, UnknownNameError
-from mcmj.utils.quiet import quiet_warnings
 from mcmj.utils.validation import MOST_STEPS, Array, as_array, require_count
 
-CHUNK = 16384  # control steps at a time in C
-RECORDABLE = ("signals", "outputs", "qpos", "qvel")
-_CTRL = mujoco.mjtState.mjSTATE_CTRL.value
-_NO_STAGE = mujoco.mjtStage.mjSTAGE_NONE.value
+CHUNK = 16384  # control steps at a time in C: 8 MB of 61 signals
+
+Hook = Callable[[float, Array], Array]
 
 
 class Reservoir(OneDrive):
     """A MuJoCo model as a reservoir; its state carries over from one rollout to the next.
 
     Args:
-        model: MJCF as a path or a string, or an MjSpec; it is copied.
+        model: MJCF as a path or a string, an MjSpec or an MjModel; it is copied.
         sensors: names or glob patterns of sensors, in order; a vector gives one signal a
             component. What the model has no sensor for is asked for by kind and object:
             "jointpos:hip_*", "jointvel:*", "tendonpos:*", "actuatorfrc:*".
@@ -48,11 +51,18 @@ class Reservoir(OneDrive):
         integrator: Euler, RK4, implicit, implicitfast, discrete; default: the model's.
         feedback_delay: steps between a signal and the force it feeds back; the first that many
             outputs fed back are 0.
+        copies: independent copies, each with its own state and, if given, readout, inputs and
+            offset; all arrays then have the copies as their first axis.
+        threads: that they run on; results do not depend on it.
 
     Raises:
         BodyFileError: no such file, or not a model.
         InvalidArgumentError, UnknownNameError: an argument out of bounds, an unknown name.
     """
+
+    _engine: Engine
+    _copies: int | None = None
+    _aliases: ClassVar[dict[str, str]] = {}  # what users call what is recorded
 
     def __init__(
         self,
@@ -65,18 +75,26 @@ class Reservoir(OneDrive):
         timestep: float | None = None,
         integrator: str | None = None,
         feedback_delay: int = 0,
+        copies: int | None = None,
+        threads: int = 1,
     ) -> None:
-        spec = read_spec(model, timestep, integrator)
-        self._adopted = adopt(spec, sensors, channels, inputs, feedback_delay)
-        install.install_control()
-        self._batch = Batch(self.model, 1, 1)
-        self._views: dict[str, Array] = {}
-        self.steps_done = 0
-        self.reset()
+        self._adopted = adopt(
+            read_spec(model, timestep, integrator),
+            sensors,
+            channels,
+            inputs,
+            feedback_delay,
+            numbers=model if isinstance(model, mujoco.MjModel) else None,
+        )
+        engine = ModelEngine(self._adopted, copies=1 if copies is None else copies, threads=threads)
+        self._begin(engine, w_out, copies)
+
+    def _begin(self, engine: Engine, w_out: object, copies: int | None) -> None:
+        self._engine, self._copies = engine, copies
         self.set_readout(w_out)
 
     @classmethod
-    def open(cls, model: Model) -> "Reservoir":
+    def open(cls, model: Model) -> Self:
         """A reservoir from its file, with its readout; see `to_mjcf`.
 
         Raises:
@@ -93,10 +111,16 @@ class Reservoir(OneDrive):
         """
         return write_reservoir(self._adopted, None if self._w_out is None else self.readout)
 
+    # --- what it is --------------------------------------------------------------------------
+
     @property
     def model(self) -> mujoco.MjModel:
-        """The compiled model, with the channels that were added."""
-        return self._adopted.model
+        """MuJoCo's compiled model; readouts and gates of a rollout are not written to it.
+
+        Raises:
+            InvalidArgumentError: the engine is not MuJoCo.
+        """
+        return self._engine.model
 
     @property
     def signal_names(self) -> tuple[str, ...]:
@@ -116,7 +140,7 @@ class Reservoir(OneDrive):
     @property
     def n_signals(self) -> int:
         """Number of signals that the readout hears."""
-        return len(self._adopted.signals)
+        return len(self.signal_names)
 
     @property
     def n_outputs(self) -> int:
@@ -124,14 +148,31 @@ class Reservoir(OneDrive):
         return len(self.channel_names)
 
     @property
+    def n_inputs(self) -> int:
+        """Number of input channels."""
+        return len(self.input_names)
+
+    @property
+    def n_forces(self) -> int:
+        """Number of forces: degrees of freedom."""
+        return int(self.model.nv)
+
+    @property
+    def copies(self) -> int | None:
+        """Number of copies; None: one, without an axis for it."""
+        return self._copies
+
+    @property
     def timestep(self) -> float:
-        """Control and physics step [s]."""
-        return float(self.model.opt.timestep)
+        """Control step [s]."""
+        return self._engine.timestep
 
     @property
     def time(self) -> float:
         """Simulation time [s]."""
-        return self.steps_done * self.timestep
+        return self._engine.steps_done * self._engine.timestep
+
+    # --- readout -----------------------------------------------------------------------------
 
     @property
     def w_out(self) -> Array | None:
@@ -141,7 +182,9 @@ class Reservoir(OneDrive):
     @property
     def readout(self) -> Readout:
         """The readout in use; without one, it always says 0."""
-        return Readout.of(self._w_out, self.n_signals, self.n_outputs)
+        if self._w_out is None:
+            return Readout.of(None, self.n_signals, self.n_outputs)
+        return Readout.from_rows(self._w_out, self.n_signals)
 
     def set_readout(self, w_out: object) -> None:
         """Replace the readout, from the next step on; None takes it away.
@@ -149,57 +192,88 @@ class Reservoir(OneDrive):
         Raises:
             InvalidArgumentError: wrong shape, or NaN.
         """
-        given = w_out is not None
-        self._w_out = readout_rows(w_out, self.n_signals, self.n_outputs) if given else None
-        users = self._batch.expand("actuator_user")[:, self._outputs_at]
-        users[:] = 0.0
-        users[:, :, : self.n_signals + 1] = self.readout.rows.T
+        self._w_out = None if w_out is None else self.checked_readout(w_out)
+        self._engine.set_readout(self._w_out)
 
-    # --- state -------------------------------------------------------------------------------
-
-    def reset(self) -> None:
-        """Back to the model's start, time 0."""
-        self._batch.reset(stage=_NO_STAGE)
-        self.steps_done = 0
-        self._heard_late = np.zeros(int(self._adopted.late.sum()))
-
-    def set_state(self, qpos: object = None, qvel: object = None) -> None:
-        """Put the joints at positions (nq,) and velocities (nv,).
+    def checked_readout(self, w_out: object) -> Array:
+        """A readout as one array (n_signals, n_outputs), or with the bias as one row more.
 
         Raises:
             InvalidArgumentError: wrong shape, or NaN.
         """
-        for name, value, size in (("qpos", qpos, self.model.nq), ("qvel", qvel, self.model.nv)):
-            if value is not None:
-                self._bound(name)[:] = as_array(name, value, (size,))
+        one = isinstance(w_out, Readout) or is_pair(w_out)
+        if self._copies is None or one or np.asarray(w_out).ndim != 3:
+            return readout_rows(w_out, self.n_signals, self.n_outputs)
+        readouts = as_array("w_out", w_out, (self._copies, None, self.n_outputs))
+        readout_rows(readouts[0], self.n_signals, self.n_outputs)  # all have the same shape
+        return readouts
+
+    # --- state -------------------------------------------------------------------------------
+
+    def reset(self) -> None:
+        """Back to the start, at time 0."""
+        self._engine.reset()
+
+    def set_state(self, qpos: object = None, qvel: object = None) -> None:
+        """Put the joints at positions (nq,) and velocities (nv,), MuJoCo's units.
+
+        Raises:
+            InvalidArgumentError: wrong shape, or NaN.
+        """
+        self._engine.set_state(qpos, qvel)
+
+    @property
+    def qpos(self) -> Array:
+        """MuJoCo's joint positions now (nq,)."""
+        return self._public(self._engine.bound("qpos").copy())
+
+    @property
+    def qvel(self) -> Array:
+        """MuJoCo's joint velocities now (nv,)."""
+        return self._public(self._engine.bound("qvel").copy())
+
+    @property
+    def signals(self) -> Array:
+        """What the readout would hear now (n_signals,)."""
+        return self._public(self._engine.current_signals())
 
     def snapshot(self) -> Array:
-        """All that `restore` needs to continue from here, bit for bit."""
-        own = [float(self.steps_done), *self._heard_late, self._fingerprint]
-        return np.concatenate([self._batch.state[0], own])
+        """The full integration state; `restore` continues from it bit for bit.
+
+        Its last column is a number that only the same model and settings have.
+        """
+        state = self._engine.snapshot()
+        return np.column_stack([state, np.full(len(state), self._fingerprint)])
 
     def restore(self, snapshot: Array) -> None:
         """Continue from a `snapshot` of a reservoir of the same model and settings.
 
         Raises:
-            InvalidArgumentError: a snapshot of another one.
+            InvalidArgumentError: a snapshot of another model, time step or other setting.
         """
-        values, n = np.asarray(snapshot), self._batch.nstate
-        late = len(self._heard_late)
-        if values.shape != (n + late + 2,) or values[-1] != self._fingerprint:
-            raise InvalidArgumentError("snapshot", "one of this model", f"shape {values.shape}")
-        self._batch.state[:] = values[:n]
-        self.steps_done, self._heard_late = int(values[n]), values[n + 1 : -1].copy()
-        if late:  # the law puts them back, see mcmj.core.callbacks.reservoir_law
-            memory = self._bound("userdata")[0, self._adopted.memory :]
-            memory[0], memory[1 : 1 + late] = 1.0, self._heard_late
+        values = np.asarray(snapshot)
+        if values.ndim != 2 or (values[:, -1:] != self._fingerprint).any():
+            raise InvalidArgumentError(
+                "snapshot", f"one of {self._described()}", f"another, of shape {values.shape}"
+            )
+        self._engine.restore(values[:, :-1])
 
-    @cached_property
-    def _fingerprint(self) -> float:
-        """48 bits of a hash of the compiled model, exact as a float."""
-        binary = np.zeros(mujoco.mj_sizeModel(self.model), np.uint8)
-        mujoco.mj_saveModel(self.model, None, binary)
-        return float(int.from_bytes(hashlib.blake2b(binary.tobytes(), digest_size=6).digest()))
+    def check_alteration(self, cut: Sequence[Any], masses: Any) -> None:
+        """Raise unless `alter` can do this.
+
+        Raises:
+            InvalidArgumentError, UnknownNameError: no such tendon or body, or a wrong mass.
+        """
+        check_model_damage(self.model, cut, masses or {})
+
+    def alter(self, *, cut: Sequence[Any] = (), masses: Any = None) -> None:
+        """Cut tendons by name and change masses [kg] of bodies, {name: mass}, for good.
+
+        Raises:
+            InvalidArgumentError, UnknownNameError: no such tendon or body, or a wrong mass.
+        """
+        self.check_alteration(cut, masses)
+        self._engine.alter(cut, masses)
 
     # --- stepping ----------------------------------------------------------------------------
 
@@ -209,23 +283,32 @@ class Reservoir(OneDrive):
         inputs: object = None,
         offset: object = None,
         gate: object = None,
+        forces: object = None,
         *,
         record: Sequence[str] = ("signals", "outputs"),
+        hook: Hook | None = None,
     ) -> Trajectory:
-        """Advance by T steps and return what was recorded.
+        """Advance by T control steps and return what was recorded.
 
         Args:
             steps: T; not needed if something is given over time.
             inputs: (T, n_inputs).
-            offset: (T, n_channels), added to the fed-back outputs: the teacher in teacher forcing.
-            gate: (n_channels,) or a number; default: 1 with a readout, else 0.
-            record: any of "signals", "outputs", "qpos", "qvel".
+            offset: (T, n_outputs), added to the fed-back outputs; the teacher in teacher forcing.
+            gate: (n_outputs,) or a number; default: 1 with a readout, else 0.
+            forces: (n_forces,) or (T, n_forces): on the degrees of freedom [N or N m], of a body
+                horizontally on its nodes [N]; or {body: (3,) [N]} constant, on bodies of a model.
+            record: any of "signals", "outputs"; of a model also "qpos", "qvel", "sensordata"
+                (all of its sensors), of a body "positions", "velocities".
+            hook: slow (one Python call a control step): function (time, signals (n_signals,)) ->
+                (n_forces,) forces during that step, for laws that nothing else covers.
 
         Raises:
             DivergenceError: the simulation blew up.
             InvalidArgumentError, UnknownNameError: an argument out of bounds.
         """
-        return join(list(self.stream(steps, inputs, offset, gate, record=record)))
+        return join(
+            list(self.stream(steps, inputs, offset, gate, forces, record=record, hook=hook))
+        )
 
     def stream(
         self,
@@ -233,106 +316,100 @@ class Reservoir(OneDrive):
         inputs: object = None,
         offset: object = None,
         gate: object = None,
+        forces: object = None,
         *,
         record: Sequence[str] = ("signals", "outputs"),
+        hook: Hook | None = None,
         chunk: int = CHUNK,
     ) -> Iterator[Trajectory]:
         """As `rollout`, yielding chunks: memory stays flat however long the run is.
 
         Raises:
-            McmjError: another stream or rollout of this reservoir is not at its end.
+            McmjError: another stream or rollout of this simulation begins before this one is at
+                its end or closed; also inside a hook.
         """
-        for name in record:
-            if name not in (*RECORDABLE, "lengths"):  # which lessons call signals
-                raise UnknownNameError("record", name, RECORDABLE)
+        wanted = frozenset("signals" if name == "lengths" else name for name in record)
+        for name in wanted - {"outputs", *self._engine.recordable}:
+            known = ["outputs", *self._engine.recordable]
+            raise UnknownNameError("record", name, [self._aliases.get(n, n) for n in known])
         require_count("chunk", chunk, 1, MOST_STEPS)
-        arrays = {
-            "inputs": series("inputs", inputs, len(self.input_names)),
-            "offset": series("offset", offset, self.n_outputs),
-        }
-        total = common_length(steps, arrays)
-        if gate is None or np.asarray(gate).ndim == 0:
-            gate = np.full(self.n_outputs, self._w_out is not None if gate is None else gate)
-        gates = as_array("gate", gate, (self.n_outputs,))
-        return self._chunks(total, arrays, gates, frozenset(record), chunk)
+        on_bodies = isinstance(forces, Mapping)
+        drive = check_drive(
+            self,
+            steps=steps,
+            inputs=inputs,
+            offset=offset,
+            gate=gate,
+            forces=None if on_bodies else forces,
+            closed=self._w_out is not None,
+            copies=self._copies,
+        )
+        if isinstance(forces, Mapping):
+            drive = replace(drive, pushes=self._engine.pushes(forces))
+        return self._chunks(drive, wanted, hook, 1 if hook else chunk)
 
-    def _bound(self, name: str) -> Array:
-        """A view (1, n) of the simulation's data, made once: making one is slow."""
-        if name not in self._views:
-            self._views[name] = self._batch.bind(name)
-        return self._views[name]
+    # --- inside ------------------------------------------------------------------------------
 
-    @property
-    def _outputs_at(self) -> slice:
-        """The actuators of the outputs."""
-        return slice(self._adopted.first, self._adopted.first + self.n_outputs)
+    @cached_property
+    def _fingerprint(self) -> float:
+        """48 bits of a hash of the model and the settings, exact as a float."""
+        digest = hashlib.blake2b(self._identity(), digest_size=6).digest()
+        return float(int.from_bytes(digest))
+
+    def _identity(self) -> bytes:
+        binary = np.zeros(mujoco.mj_sizeModel(self.model), np.uint8)
+        mujoco.mj_saveModel(self.model, None, binary)
+        return binary.tobytes()
+
+    def _described(self) -> str:
+        return "this model"
+
+    def _public(self, array: Array) -> Array:
+        """An engine's array as callers see it: one simulation has no axis of copies."""
+        return array if self._copies is not None else array[0]
 
     def _chunks(
-        self,
-        total: int,
-        arrays: dict[str, Array | None],
-        gate: Array,
-        record: frozenset[str],
-        chunk: int,
+        self, drive: Drive, record: frozenset[str], hook: Hook | None, chunk: int
     ) -> Iterator[Trajectory]:
         with self._only_drive():
-            self._batch.expand("actuator_biasprm")[:, self._outputs_at, 0] = gate
-            self._bound("ctrl")[:] = 0.0
-            for start in range(0, total, chunk):
-                stop = min(start + chunk, total)
-                yield self._run(self._control(arrays, start, stop), stop - start, record)
+            self._engine.prepare(drive)
+            for start in range(0, drive.steps, chunk):
+                stop = min(start + chunk, drive.steps)
+                now = self._with_hook(drive, hook, start) if hook else drive
+                try:
+                    chunk_run = self._run(now, record, start, stop)
+                except DivergenceError as error:
+                    raise error.after(start) from None
+                yield chunk_run
 
-    def _control(self, arrays: dict[str, Array | None], start: int, stop: int) -> Array | None:
-        """ctrl (steps, nu) of the channels; None if nothing varies."""
-        control, first = np.zeros((stop - start, self.model.nu)), self._adopted.first
-        for name, at in (("offset", first), ("inputs", first + self.n_outputs)):
-            rows = arrays[name]
-            if rows is not None:
-                control[:, at : at + rows.shape[1]] = rows[start:stop]
-        return control if any(rows is not None for rows in arrays.values()) else None
+    def _with_hook(self, drive: Drive, hook: Hook, step: int) -> Drive:
+        """The drive with the hook's forces for this one step added."""
+        if not callable(hook):
+            raise InvalidArgumentError("hook", "a function (time, signals) -> forces", repr(hook))
+        pushed = hook(self.time, self.signals)
+        forces = as_array("hook's forces", pushed, (self.n_forces,))[None]
+        if drive.forces is not None:
+            row = min(step, drive.forces.shape[-2] - 1)
+            forces = forces + drive.forces[..., row : row + 1, :]
+        return replace(drive, forces=forces)
 
-    def _run(self, control: Array | None, steps: int, record: frozenset[str]) -> Trajectory:
-        install.install_control()  # somebody may have taken it out since the last chunk
-        batch = self._batch
-        before = {name: self._bound(name).copy() for name in ("qpos", "qvel", "time")}
-        states = record & {"qpos", "qvel"}
-        with quiet_warnings():
-            rows = batch.rollout(steps, control, _CTRL, ["sensordata", *states])
-        self._check_alive(before["time"][0], steps)
-        signals = self._signals(rows["sensordata"][0])
-        times = self.timestep * np.arange(self.steps_done, self.steps_done + steps, dtype=float)
-        self.steps_done += steps
-        found: dict[str, Any] = {
-            name: np.vstack([before[name], rows[name][0]])[:-1] for name in states
-        }
+    def _run(self, drive: Drive, record: frozenset[str], start: int, stop: int) -> Trajectory:
+        done = self._engine.steps_done
+        times = self.timestep * np.arange(done, done + stop - start, dtype=np.float64)
+        measured = record - {"outputs"} | ({"signals"} if "outputs" in record else set())
+        arrays = self._engine.run(drive, tuple(sorted(measured)), start, stop)
         if "outputs" in record:
-            found["outputs"] = self.readout.outputs_by_row(signals)
-        if record & {"signals", "lengths"}:
-            found["lengths"] = signals
-        return Trajectory(times, **found)
+            arrays["outputs"] = self._outputs(arrays["signals"])
+        public = {name: self._public(arrays[name]) for name in record}
+        if "signals" in public:
+            public["lengths"] = public.pop("signals")
+        return Trajectory(times, final_state=self._final_state(), **public)
 
-    def _signals(self, sensordata: Array) -> Array:
-        """Signals (T, n_signals) as the law heard them."""
-        signals, late = sensordata[:, self._adopted.signals], self._adopted.late
-        if late.any():
-            now = signals[:, late]
-            signals[:, late] = np.vstack([self._heard_late, now])[:-1]
-            self._heard_late = now[-1].copy()
-        return signals
+    def _final_state(self) -> Any:
+        return None
 
-    def _check_alive(self, time_before: float, steps: int) -> None:
-        """Raise if MuJoCo stopped early or a number is not finite."""
-        time, speeds = float(self._bound("time")[0]), self._bound("qvel")[0]
-        done = round((time - time_before) / self.timestep)
-        if done >= steps and np.isfinite(speeds).all():
-            return
-        dof = int(np.nan_to_num(np.abs(speeds), nan=np.inf).argmax())
-        joint = self.model.joint(int(self.model.dof_jntid[dof])).name
-        self.steps_done += done
-        raise DivergenceError(
-            f"the simulation blew up after t = {time:.6g} s at joint {joint!r} (speed "
-            f"{speeds[dof]:.3g}), step {1e3 * self.timestep:g} ms; try a smaller step, another "
-            "integrator, or smaller outputs",
-            time=time,
-            steps_done=done,
-        )
+    def _outputs(self, signals: Array) -> Array:
+        """Outputs (copies, T, n_outputs); bits do not depend on the size of the chunks."""
+        if self._w_out is None:
+            return np.zeros((*signals.shape[:-1], self.n_outputs))
+        return self.readout.outputs_by_row(signals)

@@ -5,10 +5,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from mcmj.core.body import spring_lengths
 from mcmj.core.trajectory import Trajectory, join
 from mcmj.simulation.phases import Phase, RandomForces, Schedule
-from mcmj.simulation.simulation import CHUNK, Simulation
+from mcmj.simulation.reservoir import CHUNK, Reservoir
 from mcmj.utils.errors import InvalidArgumentError
 from mcmj.utils.progress import OnSteps
 from mcmj.utils.seeds import stream
@@ -38,7 +37,7 @@ class ScheduleRun:
 
 
 def run_schedule(
-    simulation: Simulation,
+    simulation: Reservoir,
     schedule: Schedule,
     seed: int,
     *,
@@ -51,18 +50,16 @@ def run_schedule(
 
     Args:
         seed: of random forces and noise.
-        record: as for Simulation.rollout; outputs always are.
+        record: as for a rollout; outputs always are.
         on_steps: called with the number of steps done after every chunk, for progress bars.
 
     Raises:
         DivergenceError: the body blew up.
         InvalidArgumentError: a phase that does not fit the body.
     """
-    if simulation.state.positions.ndim != 2:
-        raise InvalidArgumentError("simulation", "a Simulation", type(simulation).__name__)
-    schedule.check(simulation.body, simulation.timestep)
-    if any(phase.cut or phase.masses is not None for phase in schedule.phases):
-        _ = simulation.model  # only MuJoCo's bodies can change: said before anything runs
+    if simulation.copies is not None:
+        raise InvalidArgumentError("simulation", "one without copies", f"{simulation.copies}")
+    schedule.check(simulation)
     forces, noise = stream(seed, "schedule_forces"), stream(seed, "schedule_noise")
     counts = schedule.steps(simulation.timestep)
     parts: list[Trajectory] = []
@@ -71,7 +68,7 @@ def run_schedule(
         last = feedback[-1][-1] if feedback else None
         if isinstance(phase.forces, RandomForces):
             scale = phase.forces.scale
-            pattern = forces.uniform(-scale, scale, simulation.body.n_nodes)
+            pattern = forces.uniform(-scale, scale, simulation.n_forces)
             phase = replace(phase, forces=pattern)
         for part, pushed in _run_phase(simulation, phase, steps, last, noise, record):
             parts.append(part)
@@ -82,7 +79,7 @@ def run_schedule(
 
 
 def _run_phase(
-    simulation: Simulation,
+    simulation: Reservoir,
     phase: Phase,
     steps: int,
     last: Array | None,
@@ -90,7 +87,6 @@ def _run_phase(
     record: Sequence[str],
 ) -> Iterator[tuple[Trajectory, Array]]:
     """Chunks of a phase, and what was fed back during each."""
-    body = simulation.body
     if phase.w_out is not None:
         simulation.set_readout(phase.w_out)
     if phase.cut or phase.masses is not None:
@@ -100,7 +96,7 @@ def _run_phase(
         n = min(CHUNK, steps - start)
         offset = np.tile(constant, (n, 1))
         if phase.length_noise > 0 and simulation.w_out is not None:
-            noise = phase.length_noise * noise_of.standard_normal((n, body.n_springs))
+            noise = phase.length_noise * noise_of.standard_normal((n, simulation.n_signals))
             offset += gate * simulation.readout.weighted(noise)
         part = simulation.rollout(
             offset=offset, gate=gate, forces=phase.forces, record=tuple({*record, "outputs"})
@@ -109,23 +105,18 @@ def _run_phase(
 
 
 def _gate_and_offset(
-    simulation: Simulation, phase: Phase, last: Array | None
+    simulation: Reservoir, phase: Phase, last: Array | None
 ) -> tuple[Array, Array]:
     """Gate and constant offset (n_outputs,) of a phase; frozen channels hold what was `last`."""
-    body = simulation.body
-    gate = np.full(body.n_outputs, float(simulation.w_out is not None))
+    n_outputs = simulation.n_outputs
+    gate = np.full(n_outputs, float(simulation.w_out is not None))
     if phase.gate is not None:
         gate[:] = phase.gate
-    offset = np.zeros(body.n_outputs)
+    offset = np.zeros(n_outputs)
     if phase.offset is not None:
         offset[:] = phase.offset
     if phase.freeze:
         frozen = list(phase.freeze)
-        held = _outputs_now(simulation) if last is None else last
+        held = simulation.readout.outputs(simulation.signals) if last is None else last
         gate[frozen], offset[frozen] = 0.0, held[frozen]
     return gate, offset
-
-
-def _outputs_now(simulation: Simulation) -> Array:
-    lengths = spring_lengths(simulation.state.positions, simulation.body.springs)
-    return simulation.readout.outputs(lengths)

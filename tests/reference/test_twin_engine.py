@@ -101,7 +101,9 @@ def test_what_the_twin_does_not_do_is_named(body):
         mcmj.Simulation(body, engine="twin", integrator="discrete")
     with pytest.raises(UnknownNameError, match="mujoco, twin"):
         mcmj.Simulation(body, engine="jax")
-    with pytest.raises(InvalidArgumentError, match="lengths or outputs from the twin"):
+    with pytest.raises(
+        UnknownNameError, match="record .positions.; valid choices: lengths, outputs"
+    ):
         mcmj.Simulation(body, engine="twin").rollout(1, record=("positions",))
 
 

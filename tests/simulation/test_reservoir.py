@@ -39,6 +39,7 @@ CHANNELS = {"y": {"m1": 1.5, "p2": -0.5}, "z": {"f3": 1.0, "iv": 0.3}, "w": {"d"
 INTEGRATORS = ["Euler", "RK4", "implicit", "implicitfast"]
 T = 3000
 COMPILED = mujoco.MjModel.from_xml_string(ARM)
+mujoco.MjModel.from_xml_string("<mujoco/>")  # the last one, then
 
 
 def python_loop(reservoir, w_out, gate, offset, inputs):
@@ -172,11 +173,7 @@ def test_a_body_is_the_same_as_a_reservoir_and_as_a_simulation(body, w_bias):
     [
         ({"model": "nowhere.xml"}, BodyFileError, "model: "),
         ({"model": "<mujoco><nix/></mujoco>"}, BodyFileError, "model: "),
-        (
-            {"model": mujoco.MjModel.from_xml_string(ARM)},
-            InvalidArgumentError,
-            "model: expected MJ",
-        ),
+        ({"model": COMPILED}, BodyFileError, "MuJoCo does not write this MjModel"),
         ({"sensors": "nix*"}, UnknownNameError, r"unknown sensor 'nix\*'; valid choices: acc"),
         ({"sensors": "jointpos:no"}, UnknownNameError, "unknown joint"),
         ({"sensors": ()}, InvalidArgumentError, "sensors: expected at least one sensor"),
@@ -268,3 +265,85 @@ def test_a_hostile_model_cannot_harm(tmp_path):  # MuJoCo writes a log where it 
     command = [sys.executable, "-c", HOSTILE]
     done = subprocess.run(command, capture_output=True, text=True, cwd=tmp_path)
     assert done.stdout == "alive\n", done.stderr
+
+
+def test_a_compiled_model_keeps_its_numbers():
+    model = mujoco.MjModel.from_xml_string(ARM)
+    model.dof_damping[:] = [1 / 3, 2 / 3, 1 / 7]
+    model.opt.gravity[2] = -1 / 3
+    before = model.dof_damping.copy()
+    reservoir = Reservoir(model, sensors="jointpos:*", channels=CHANNELS)
+    run = reservoir.rollout(offset=np.ones((1000, 3)), record=("qpos", "qvel"))
+    data = mujoco.MjData(model)
+    data.ctrl[:] = [1.5, -0.5, 1.0, 0.0, 0.3, 1.0]
+    mujoco.mj_step(model, data, 999)
+    assert np.array_equal(run.qpos[-1], data.qpos)
+    assert np.array_equal(run.qvel[-1], data.qvel)
+    assert np.array_equal(model.dof_damping, before)
+    assert model.nu == 6
+
+
+def test_copies_are_what_they_are_alone_on_any_number_of_threads():
+    given = {"sensors": SENSORS, "channels": CHANNELS, "inputs": ["free"]}
+    rng = np.random.default_rng(1)
+    alone = Reservoir(ARM, **given)
+    w_out = 0.02 * rng.normal(size=(3, alone.n_signals + 1, 3))
+    offset, inputs = rng.normal(size=(3, 400, 3)), rng.normal(size=(400, 1))
+    qvel = rng.normal(size=(3, 3))
+    runs = []
+    for threads in (1, 2):
+        copies = Reservoir(ARM, **given, copies=3, threads=threads, w_out=w_out)
+        copies.set_state(qvel=qvel)
+        first = copies.rollout(inputs=inputs[:150], offset=offset[:, :150])
+        copies.restore(copies.snapshot())
+        rest = copies.rollout(inputs=inputs[150:], offset=offset[:, 150:])
+        runs.append(np.concatenate([first.signals, rest.signals], axis=1))
+    assert np.array_equal(*runs)
+    for k in range(3):
+        alone.reset()
+        alone.set_state(qvel=qvel[k])
+        alone.set_readout(w_out[k])
+        run = alone.rollout(inputs=inputs, offset=offset[k])
+        assert np.array_equal(run.signals, runs[0][k])
+    assert np.array_equal(copies.signals.shape, (3, alone.n_signals))
+
+
+def test_forces_act_on_joints_and_on_bodies():
+    model = mujoco.MjModel.from_xml_string(ARM)
+    for forces, field in (
+        (np.array([0.3, -0.2, 0.1]), "qfrc_applied"),
+        ({"b": (1.0, 2.0, -3.0)}, "xfrc_applied"),
+    ):
+        reservoir = Reservoir(ARM, sensors="q1", channels=["m1"])
+        run = reservoir.rollout(500, forces=forces, record=("qpos",))
+        after = reservoir.rollout(2, record=("qpos",))
+        data = mujoco.MjData(model)
+        if field == "qfrc_applied":
+            data.qfrc_applied[:] = forces
+        else:
+            data.xfrc_applied[model.body("b").id, :3] = forces["b"]
+        mujoco.mj_step(model, data, 499)
+        assert np.array_equal(run.qpos[-1], data.qpos)
+        mujoco.mj_step(model, data)
+        assert np.array_equal(after.qpos[0], data.qpos)
+        data.qfrc_applied[:], data.xfrc_applied[:] = 0.0, 0.0
+        mujoco.mj_step(model, data)
+        assert np.array_equal(after.qpos[1], data.qpos)
+    with pytest.raises(UnknownNameError, match="unknown body 'no'; valid choices: a, b"):
+        reservoir.rollout(5, forces={"no": (0, 0, 1)})
+
+
+def test_a_heavier_body_and_a_cut_tendon_are_another_model():
+    soft = ARM.replace('<spatial name="t">', '<spatial name="t" stiffness="30" damping="1">')
+    reservoir = Reservoir(soft, sensors="q1", channels=["m1"])
+    mass = float(reservoir.model.body("b").mass[0])
+    reservoir.alter(cut=("t",), masses={"b": 2 * mass})
+    run = reservoir.rollout(500, record=("qpos",))
+    spec = mujoco.MjSpec.from_string(ARM)
+    spec.body("b").geoms[0].density *= 2
+    data = mujoco.MjData(model := spec.compile())
+    mujoco.mj_step(model, data, 499)
+    assert np.abs(run.qpos[-1] - data.qpos).max() < 1e-13
+    for damage in ({"cut": ("no",)}, {"masses": {"no": 1.0}}):
+        with pytest.raises(UnknownNameError, match=r"unknown (tendon|body) 'no'"):
+            reservoir.alter(**damage)

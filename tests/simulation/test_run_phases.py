@@ -7,10 +7,10 @@ import pytest
 import twins
 
 import mcmj
-from mcmj import Simulation
+from mcmj import Reservoir, Simulation
 from mcmj.simulation import run_phases
 from mcmj.simulation.run_phases import Phase, RandomForces, Schedule, run_schedule
-from mcmj.utils.errors import InvalidArgumentError
+from mcmj.utils.errors import InvalidArgumentError, UnknownNameError
 from mcmj.utils.seeds import stream
 
 STEP = 1e-3
@@ -165,7 +165,7 @@ def test_a_schedule_that_begins_frozen_holds_the_output_of_that_moment(body, w_o
 
 def test_the_twin_engine_says_that_bodies_do_not_change(body, w_out):
     simulation = Simulation(body, w_out=w_out, engine="twin")
-    with pytest.raises(InvalidArgumentError, match="'mujoco', which has a model"):
+    with pytest.raises(InvalidArgumentError, match="'mujoco' for bodies that change"):
         run_schedule(simulation, Schedule([Phase(0.05), Phase(0.05, cut=(0,))]), 0)
     assert simulation.time == 0.0
 
@@ -225,5 +225,50 @@ def test_a_phase_that_does_not_fit_is_refused_before_anything_runs(body, w_out, 
 
 
 def test_ensembles_are_refused(body, w_out):
-    with pytest.raises(InvalidArgumentError, match="a Simulation"):
+    with pytest.raises(InvalidArgumentError, match="one without copies, got 2"):
         run_schedule(mcmj.Ensemble(body, copies=2, w_out=w_out), Schedule([Phase(0.05)]), 0)
+
+
+CHAIN = """
+<mujoco><option timestep="0.002" gravity="0 0 0" integrator="implicitfast"/><worldbody>
+<body name="a"><joint name="j1" axis="0 0 1" damping=".05" stiffness="2"/>
+  <geom type="capsule" fromto="0 0 0 .2 0 0" size=".02"/>
+<body name="b" pos=".2 0 0"><joint name="j2" axis="0 0 1" damping=".02" stiffness="1"/>
+  <geom type="capsule" fromto="0 0 0 .2 0 0" size=".02"/></body></body></worldbody>
+<actuator><motor name="m1" joint="j1"/><motor name="m2" joint="j2"/></actuator></mujoco>"""
+
+
+def test_phases_of_any_model():
+    """Freeze, switch, forces by joint and by body, noise, masses: rollouts with that law."""
+    rng = np.random.default_rng(3)
+    w_out, other = 0.2 * rng.normal(size=(2, 5, 2))
+    model = Reservoir(CHAIN, sensors=["jointpos:*", "jointvel:*"], channels=["m1", "m2"])
+    model.set_state(qvel=[1.0, -2.0])
+    model.set_readout(w_out)
+    start = model.snapshot()
+    phases = [
+        Phase(0.4, freeze=(1,)),
+        Phase(0.4, forces=(0.1, 0.2)),
+        Phase(0.4, forces={"b": (0.1, -0.2, 0.0)}, w_out=other),
+        Phase(0.4, length_noise=0.1, masses={"b": 0.5}),
+    ]
+    run = run_schedule(model, Schedule(phases), seed=0, record=("signals", "outputs"))
+    assert np.allclose(run.feedback[:200, 1], run.feedback[0, 1], rtol=0, atol=0)
+
+    model = Reservoir(CHAIN, sensors=["jointpos:*", "jointvel:*"], channels=["m1", "m2"])
+    model.restore(start)
+    model.set_readout(w_out)
+    held = (model.signals @ w_out[:4] + w_out[4])[1]
+    parts = [
+        model.rollout(offset=np.tile([0.0, held], (200, 1)), gate=(1.0, 0.0)),
+        model.rollout(200, forces=(0.1, 0.2)),
+    ]
+    model.set_readout(other)
+    parts.append(model.rollout(200, forces={"b": (0.1, -0.2, 0.0)}))
+    model.alter(masses={"b": 0.5})
+    noise = 0.1 * stream(0, "schedule_noise").standard_normal((200, 4))
+    parts.append(model.rollout(offset=noise @ other[:4]))
+    signals = np.concatenate([part.signals for part in parts])
+    assert np.abs(run.trajectory.signals - signals).max() < 1e-12
+    with pytest.raises(UnknownNameError, match="unknown body 'no'"):
+        run_schedule(model, Schedule([Phase(1.0, masses={"no": 1.0})]), seed=0)

@@ -1,5 +1,7 @@
 """The compiled twin with the interface of MuJoCo's engine: Simulation(engine="twin")."""
 
+from typing import Any
+
 import numpy as np
 
 from mcmj.core.body import Body, spring_lengths
@@ -15,8 +17,10 @@ from mcmj.utils.validation import Array, as_array, require_count
 class TwinEngine:
     """Copies of one body under a compiled twin; see Simulation for the options.
 
-    Records lengths only: positions and velocities are MuJoCo's to show.
+    Records signals only: positions and velocities are MuJoCo's to show.
     """
+
+    recordable: tuple[str, ...] = ("signals",)
 
     def __init__(self, body: Body, options: Options, *, copies: int, threads: int) -> None:
         require_count("copies", copies, 1)
@@ -88,7 +92,28 @@ class TwinEngine:
             part[:] = piece.reshape(part.shape)  # NaN marks an empty leapfrog history
         self._population.steps_done = int(snapshot[0, -1])
 
-    def current_lengths(self) -> Array:
+    @property
+    def model(self) -> Any:
+        """There is none: nothing of MuJoCo's can be asked for or altered.
+
+        Raises:
+            InvalidArgumentError: always.
+        """
+        raise InvalidArgumentError("engine", "'mujoco', which has a model", "'twin'")
+
+    def bound(self, name: str) -> Array:
+        """As `model`."""
+        raise InvalidArgumentError("engine", f"'mujoco', which has {name}", "'twin'")
+
+    def alter(self, cut: object, masses: object) -> None:
+        """As `model`."""
+        raise InvalidArgumentError("engine", "'mujoco' for bodies that change", "'twin'")
+
+    def pushes(self, forces: object) -> Array:
+        """As `model`."""
+        raise InvalidArgumentError("forces", "(N,) or (T, N) on a body's nodes", "names")
+
+    def current_signals(self) -> Array:
         """Spring lengths (copies, L) [m] at the current state."""
         return spring_lengths(self.state.positions, self.body.springs)
 
@@ -100,13 +125,10 @@ class TwinEngine:
 
         Raises:
             DivergenceError: a copy blew up.
-            InvalidArgumentError: asked to record more than lengths.
         """
-        if set(record) - {"lengths"}:
-            raise InvalidArgumentError("record", "lengths or outputs from the twin", record)
-        taken, done = self._population.run(drive, start, stop, lengths="lengths" in record)
+        taken, done = self._population.run(drive, start, stop, lengths="signals" in record)
         dead = np.flatnonzero(done < stop - start)
         if dead.size:
             copy = int(dead[0])
             raise self._population.divergence(copy, int(done[copy]), stop - start)
-        return {"lengths": taken.lengths} if "lengths" in record else {}
+        return {"signals": taken.lengths} if "signals" in record else {}

@@ -12,6 +12,8 @@ from mcmj.core.body import Body
 from mcmj.core.trajectory import RECORDABLE, Trajectory, join
 from mcmj.mjcf.read import from_mjcf
 from mcmj.mjcf.write import to_mjcf
+from mcmj.simulation.models.reservoir_file import SETTINGS
+from mcmj.simulation.reservoir import Reservoir
 from mcmj.simulation.trajectory_files.checks import check_body_fits, checked_trajectory, reading
 from mcmj.utils import files
 from mcmj.utils.errors import InvalidArgumentError, TrajectoryFileError
@@ -28,19 +30,21 @@ class StoredRun:
         trajectory: what was recorded; the state after the last step is not kept.
         body, w_out: of the run, None if they were not given.
         provenance: config, seed and versions.
+        reservoir: of the run, if it was no body, as MJCF for `Reservoir.open`.
     """
 
     trajectory: Trajectory
     body: Body | None
     w_out: Array | None
     provenance: dict[str, object]
+    reservoir: str | None = None
 
 
 def save_trajectory(
     path: str | Path,
     run: Trajectory | Iterable[Trajectory],
     *,
-    body: Body | None = None,
+    body: Body | Reservoir | None = None,
     w_out: object = None,
     config: Mapping[str, object] | object = None,
     seed: int = 0,
@@ -51,7 +55,8 @@ def save_trajectory(
 
     Args:
         path: ends with .npz or .zarr (needs the extra "files").
-        body, w_out: kept as MJCF, so that the run can be drawn and gone on with.
+        body, w_out: kept as MJCF, so that the run can be drawn and gone on with; a reservoir
+            that is no body is kept with the readout that it has.
         config, seed: go into the file's account of where it comes from, with all versions.
 
     Raises:
@@ -61,7 +66,11 @@ def save_trajectory(
     final = Path(path)
     _check_suffix(final)
     parts = iter([run] if isinstance(run, Trajectory) else run)
-    xml = None if body is None else to_mjcf(body, w_out=w_out)
+    xml: str | None = None
+    if isinstance(body, Reservoir):
+        xml = body.to_mjcf()
+    elif body is not None:
+        xml = to_mjcf(body, w_out=w_out)
     if final.suffix == ".zarr":
         from mcmj.simulation.trajectory_files.zarr import write_zarr  # its packages are an extra
 
@@ -101,6 +110,8 @@ def load_trajectory(path: str | Path) -> StoredRun:
         return StoredRun(trajectory, None, None, account)
     if not isinstance(xml, str) or not xml.lstrip().startswith("<"):  # a path would be read
         raise TrajectoryFileError(f"{final}: expected a body in MJCF, got {str(xml)[:40]!r}")
+    if SETTINGS in xml:
+        return StoredRun(trajectory, None, None, account, xml)
     body, w_out = from_mjcf(xml)
     with reading(final, "a run of its own body"):
         check_body_fits(trajectory, body)

@@ -1,7 +1,8 @@
 """Trajectories as xarray Datasets and Zarr folders: named axes with units, written in chunks.
 
 Needs the extra "files" (xarray, zarr). Axes: time [s], spring, node, axis (x, then y), output,
-and copy for an ensemble. `xarray.open_zarr(path)` reads a long run lazily.
+and copy for copies; of a model that is no body, its joints and sensors.
+`xarray.open_zarr(path)` reads a long run lazily.
 """
 
 import json
@@ -26,10 +27,13 @@ _AXES = {
     "outputs": ("time", "output"),
     "positions": ("time", "node", "axis"),
     "velocities": ("time", "node", "axis"),
+    "qpos": ("time", "qpos"),
+    "qvel": ("time", "qvel"),
+    "sensordata": ("time", "sensordata"),
 }
 # not a coordinate of strings: Zarr has no stable format for those
 _NOTES = {"positions": {"axis": "x, y"}, "velocities": {"axis": "x, y"}}
-_UNITS = {"lengths": "m", "outputs": "1", "positions": "m", "velocities": "m/s"}
+_UNITS = {"lengths": "m", "outputs": "1", "positions": "m", "velocities": "m/s"}  # of a body
 
 
 def to_dataset(trajectory: Trajectory) -> xarray.Dataset:
@@ -39,7 +43,7 @@ def to_dataset(trajectory: Trajectory) -> xarray.Dataset:
         array = getattr(trajectory, name)
         if array is not None:
             axes = _AXES[name] if array.ndim == len(_AXES[name]) else ("copy", *_AXES[name])
-            variables[name] = (axes, array, {"units": _UNITS[name]} | _NOTES.get(name, {}))
+            variables[name] = (axes, array, {"units": _UNITS.get(name, "")} | _NOTES.get(name, {}))
     time = ("time", trajectory.times, {"units": "s", "long_name": "time at the start of the step"})
     return xarray.Dataset(variables, coords={"time": time})
 

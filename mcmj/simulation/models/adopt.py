@@ -4,9 +4,8 @@ MjSpec keeps what the model is; what is added holds no force and changes no moti
 gain 0 (a channel each, see `mcmj.core.callbacks.reservoir_law`), sensors, one custom numeric.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from fnmatch import fnmatchcase
 from os import PathLike
 from pathlib import Path
 from typing import Any, TypeAlias
@@ -17,23 +16,14 @@ import numpy.typing as npt
 
 from mcmj.core.callbacks.reservoir_law import NUMERIC, Law, block
 from mcmj.core.integrators import integrator_named
-from mcmj.utils.errors import BodyFileError, InvalidArgumentError, UnknownNameError
+from mcmj.simulation.models.compiled import spec_of_compiled, take_numbers
+from mcmj.simulation.models.names import Channels, resolved_channels, resolved_sensors
+from mcmj.utils.errors import BodyFileError, InvalidArgumentError
 from mcmj.utils.quiet import quiet_warnings
 from mcmj.utils.validation import require_count, require_number
 
-Model: TypeAlias = str | PathLike[str] | mujoco.MjSpec
-Channels: TypeAlias = Sequence[str] | Mapping[str, Mapping[str, float]]
+Model: TypeAlias = str | PathLike[str] | mujoco.MjSpec | mujoco.MjModel
 
-# what can be asked for that the model has no sensor of: MJCF's sensor, and its object
-ADDABLE = {
-    "jointpos": ("joint", mujoco.mjtObj.mjOBJ_JOINT),
-    "jointvel": ("joint", mujoco.mjtObj.mjOBJ_JOINT),
-    "tendonpos": ("tendon", mujoco.mjtObj.mjOBJ_TENDON),
-    "tendonvel": ("tendon", mujoco.mjtObj.mjOBJ_TENDON),
-    "actuatorpos": ("actuator", mujoco.mjtObj.mjOBJ_ACTUATOR),
-    "actuatorvel": ("actuator", mujoco.mjtObj.mjOBJ_ACTUATOR),
-    "actuatorfrc": ("actuator", mujoco.mjtObj.mjOBJ_ACTUATOR),
-}
 OURS = "mcmj:"  # begins the names of what is added
 _COPIED = (
     "type",
@@ -99,10 +89,7 @@ def _copied(model: Model) -> mujoco.MjSpec:
     if isinstance(model, mujoco.MjSpec):
         return model.copy()
     if isinstance(model, mujoco.MjModel):
-        raise InvalidArgumentError(
-            "model", "MJCF (a path or a string) or an MjSpec: a compiled model takes no channels",
-            "an MjModel",
-        )  # fmt: skip
+        return spec_of_compiled(model)
     try:
         with quiet_warnings():
             if isinstance(model, str) and model.lstrip().startswith("<"):
@@ -118,11 +105,13 @@ def adopt(
     channels: Channels,
     inputs: Channels = (),
     feedback_delay: int = 0,
+    numbers: mujoco.MjModel | None = None,
 ) -> AdoptedModel:
     """A model with the channels of a reservoir; the arguments are those of Reservoir.
 
     Args:
         spec: of `read_spec`; it is changed.
+        numbers: the compiled model that the spec was read from, if it was one.
 
     Raises:
         BodyFileError: not a model.
@@ -130,77 +119,14 @@ def adopt(
             that the model does not have.
     """
     require_count("feedback_delay", feedback_delay, 0)
-    heard = _resolved_sensors(spec, sensors)
-    outputs = _resolved_channels(spec, "channel", channels)
+    heard = resolved_sensors(spec, sensors)
+    outputs = resolved_channels(spec, "channel", channels)
     if not outputs:
         raise InvalidArgumentError("channels", "at least one actuator", channels)
-    driven = _resolved_channels(spec, "input", inputs)
-    return _with_channels(spec, heard, outputs, driven, feedback_delay)
-
-
-def _resolved_sensors(spec: mujoco.MjSpec, sensors: str | Sequence[str]) -> list[str]:
-    """Names of sensors of the spec, in order; those asked for as kind:object are added."""
-    found: list[str] = []
-    for pattern in [sensors] if isinstance(sensors, str) else sensors:
-        kind, colon, objects = pattern.partition(":")
-        if colon and kind in ADDABLE:
-            matches = [_added(spec, kind, name) for name in _objects(spec, kind, objects)]
-        else:
-            known = [sensor.name for sensor in spec.sensors if sensor.name]
-            matches = _matching(pattern, known)
-            if not matches:
-                raise UnknownNameError("sensor", pattern, [*known, *(f"{k}:*" for k in ADDABLE)])
-        found += [name for name in matches if name not in found]
-    if not found:
-        raise InvalidArgumentError("sensors", "at least one sensor", sensors)
-    return found
-
-
-def _matching(pattern: str, known: list[str]) -> list[str]:
-    """Known names that a pattern matches; one that is a name itself, brackets and all, is that."""
-    return [pattern] if pattern in known else [n for n in known if fnmatchcase(n, pattern)]
-
-
-def _objects(spec: mujoco.MjSpec, kind: str, pattern: str) -> list[str]:
-    """Names of the joints, tendons or actuators that a pattern matches."""
-    what, _ = ADDABLE[kind]
-    known = [one.name for one in getattr(spec, f"{what}s") if one.name]
-    if what == "joint":
-        scalar = (mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_SLIDE)
-        known = [joint.name for joint in spec.joints if joint.name and joint.type in scalar]
-    matches = _matching(pattern, known)
-    if not matches:
-        raise UnknownNameError(f"{what} (of sensor {kind})", pattern, known)
-    return matches
-
-
-def _added(spec: mujoco.MjSpec, kind: str, name: str) -> str:
-    """Name of a sensor of that kind of that object, added if there is none."""
-    full = f"{kind}:{name}"
-    if full not in [sensor.name for sensor in spec.sensors]:
-        what = getattr(mujoco.mjtSensor, f"mjSENS_{kind.upper()}")
-        spec.add_sensor(name=full, type=what, objtype=ADDABLE[kind][1], objname=name)
-    return full
-
-
-def _resolved_channels(
-    spec: mujoco.MjSpec, kind: str, given: Channels
-) -> dict[str, dict[str, float]]:
-    """The gain of each actuator, by channel."""
-    known = [actuator.name for actuator in spec.actuators if actuator.name]
-    if isinstance(given, Mapping):
-        for name, gains in given.items():
-            for actuator, gain in gains.items():
-                if actuator not in known:
-                    raise UnknownNameError(f"actuator of {kind} {name}", actuator, known)
-                require_number(f"gain of {actuator}", gain, -np.inf)
-        return {name: dict(gains) for name, gains in given.items()}
-    found: dict[str, dict[str, float]] = {}
-    for pattern in [given] if isinstance(given, str) else given:
-        matches = _matching(pattern, known)
-        if not matches:
-            raise UnknownNameError(f"actuator of {kind}s", pattern, known)
-        found |= {name: {name: 1.0} for name in matches}
+    driven = resolved_channels(spec, "input", inputs)
+    found = _with_channels(spec, heard, outputs, driven, feedback_delay)
+    if numbers is not None:
+        take_numbers(numbers, found.model)
     return found
 
 

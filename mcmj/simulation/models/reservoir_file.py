@@ -12,7 +12,7 @@ import numpy as np
 
 from mcmj.core.callbacks.reservoir_law import NUMERIC
 from mcmj.core.readout import Readout
-from mcmj.simulation.adopted_model import OURS, AdoptedModel, Model, read_spec
+from mcmj.simulation.models.adopt import OURS, AdoptedModel, Model, read_spec
 from mcmj.utils.errors import BodyFileError
 from mcmj.utils.quiet import quiet_warnings
 from mcmj.utils.validation import Array

@@ -1,0 +1,201 @@
+"""Copies of one model in MuJoCo's Batch, stepped wholly in C on several threads.
+
+What bodies (mcmj.simulation.body_engine) and other models (mcmj.simulation.models.engine) have in
+common: the state, the drive, and the check that the numbers are finite. Arrays have the copies as
+their first axis.
+"""
+
+from typing import NamedTuple
+
+import mujoco
+import numpy as np
+import numpy.typing as npt
+from mujoco.batch import Batch
+
+from mcmj.core.callbacks import install
+from mcmj.core.rollout_arguments import Drive
+from mcmj.utils.errors import DivergenceError, InvalidArgumentError
+from mcmj.utils.forking import guard_against_forks
+from mcmj.utils.quiet import quiet_warnings
+from mcmj.utils.validation import Array, require_count
+
+_CTRL = mujoco.mjtState.mjSTATE_CTRL.value
+_APPLIED = mujoco.mjtState.mjSTATE_QFRC_APPLIED.value
+_TIME = mujoco.mjtState.mjSTATE_TIME.value
+_NO_STAGE = mujoco.mjtStage.mjSTAGE_NONE.value
+POSITION_STAGE = mujoco.mjtStage.mjSTAGE_POS.value
+
+
+class Channels(NamedTuple):
+    """Where a drive enters a model.
+
+    Attributes:
+        inputs, outputs: the actuators of inputs and of feedback channels.
+        pushed: degrees of freedom that forces act on, and ..
+        forces: .. which column of the forces acts on each.
+    """
+
+    inputs: slice
+    outputs: slice
+    pushed: npt.NDArray[np.int64]
+    forces: npt.NDArray[np.int64]
+
+
+class BatchEngine:
+    """Copies of a compiled model that a drive enters through channels.
+
+    Args:
+        timestep: control step [s]; `substeps` of the model's steps.
+        copies, threads: of the batch.
+    """
+
+    advice = "try a smaller step, another integrator, or smaller outputs"
+    _passive = False  # whether mcmj's callback makes passive forces
+    _stage = POSITION_STAGE  # up to which sensors are of use
+
+    def __init__(
+        self,
+        model: mujoco.MjModel,
+        channels: Channels,
+        *,
+        timestep: float,
+        substeps: int = 1,
+        copies: int = 1,
+        threads: int = 1,
+    ) -> None:
+        require_count("copies", copies, 1)
+        require_count("threads", threads, 1)
+        self.model, self.timestep, self.substeps = model, timestep, substeps
+        self._channels = channels
+        self._batch = Batch(model, copies, threads)
+        if threads > 1:
+            guard_against_forks(self)
+        self._views: dict[str, Array] = {}
+        self.steps_done = 0
+        self.reset()
+
+    @property
+    def copies(self) -> int:
+        """Number of simulations."""
+        return int(self._batch.nsim)
+
+    def bound(self, name: str) -> Array:
+        """A view (copies, n) of the simulations' data, made once: making one is slow."""
+        if name not in self._views:
+            self._views[name] = self._batch.bind(name)
+        return self._views[name]
+
+    def reset(self) -> None:
+        """All copies back to the start, time 0."""
+        self._batch.reset(stage=_NO_STAGE)
+        self.steps_done = 0
+
+    def set_readout(self, w_out: Array | None) -> None:
+        """Readouts (rows, n_outputs) for all copies, or (copies, rows, n_outputs)."""
+        if self._channels.outputs.stop == self._channels.outputs.start:
+            return
+        weights = self._batch.expand("actuator_user")[:, self._channels.outputs]
+        weights[:] = 0.0
+        if w_out is not None:
+            weights[:, :, : w_out.shape[-2]] = np.swapaxes(w_out, -1, -2)
+
+    def snapshot(self) -> Array:
+        """Full integration state (copies, n): all that `restore` needs."""
+        return np.column_stack([self._batch.state, np.full(self.copies, float(self.steps_done))])
+
+    def restore(self, snapshot: Array) -> None:
+        """Continue from a snapshot, bit for bit.
+
+        Raises:
+            InvalidArgumentError: another shape.
+        """
+        shape = (self.copies, self._batch.nstate + 1)
+        if snapshot.shape != shape:
+            raise InvalidArgumentError("snapshot", f"shape {shape}", f"shape {snapshot.shape}")
+        self._batch.state[:] = snapshot[:, :-1]
+        self.steps_done = int(snapshot[0, -1])
+
+    def sensors_now(self) -> Array:
+        """All sensors (copies, n) of the state as it is."""
+        sensors = self.bound("sensordata")
+        self._install()
+        with quiet_warnings():
+            self._batch.forward(stage=self._stage)
+        return sensors
+
+    # --- stepping ----------------------------------------------------------------------------
+
+    def prepare(self, drive: Drive) -> None:
+        """Set gates and clear old inputs before the first chunk of a drive."""
+        gates = self._batch.expand("actuator_biasprm")[:, self._channels.outputs, 0]
+        gates[:] = drive.gate
+        self._batch.ctrl = 0.0
+        self._batch.qfrc_applied = 0.0
+
+    def _install(self) -> None:
+        """Callbacks again: somebody may have taken them out since the last chunk."""
+        install.install(passive=self._passive)
+
+    def _advance(self, drive: Drive, start: int, stop: int, fields: list[str]) -> dict[str, Array]:
+        """Fields (copies, steps, n) after each physics step of control steps start .. stop - 1."""
+        self._install()
+        steps = (stop - start) * self.substeps
+        control, spec = self._control(drive, start, stop)
+        before = self.bound("time").copy()
+        with quiet_warnings():
+            rows: dict[str, Array] = self._batch.rollout(steps, control, spec, fields or [_TIME])
+        self._check_alive(before, steps)
+        self.steps_done += stop - start
+        return rows
+
+    def _control(self, drive: Drive, start: int, stop: int) -> tuple[Array | None, int]:
+        """Rows (copies, steps, n) of ctrl, and of qfrc_applied if forces vary, and their spec."""
+        forces, at = drive.forces, self._channels
+        lead: tuple[int, ...] = ()
+        for array in (drive.inputs, drive.offset, forces):
+            if array is not None and array.ndim == 3:
+                lead = (self.copies,)
+        varying = forces is not None and forces.shape[-2] > 1
+        if forces is not None and not varying:
+            self.bound("qfrc_applied")[:, at.pushed] = forces[..., 0, at.forces]
+        if drive.inputs is None and drive.offset is None and not varying:
+            return None, _CTRL
+        nu, n_applied = self.model.nu, self.model.nv if varying else 0
+        control = np.zeros((*lead, stop - start, nu + n_applied))
+        for rows, place in ((drive.inputs, at.inputs), (drive.offset, at.outputs)):
+            if rows is not None:
+                control[..., place] = rows[..., start:stop, :]
+        if varying and forces is not None:
+            control[..., nu + at.pushed] = forces[..., start:stop, at.forces]
+        spec = _CTRL | _APPLIED if varying else _CTRL
+        return np.repeat(control, self.substeps, axis=-2), spec
+
+    def _check_alive(self, time_before: Array, steps: int) -> None:
+        """Raise if a copy stopped early or holds a number that is not finite."""
+        time, step = self.bound("time"), self.timestep / self.substeps
+        done = np.rint((time - time_before) / step).astype(int)
+        finite = np.isfinite(self.bound("qvel")).all(axis=1)
+        dead = np.flatnonzero((done < steps) | ~finite)
+        if not dead.size:
+            return
+        copy = dead[0]
+        self.steps_done += int(done[copy]) // self.substeps
+        which = f"copy {copy}: " if self.copies > 1 else ""
+        raise DivergenceError(
+            f"{which}the simulation blew up after t = {time[copy]:.6g} s at {self._fastest(copy)}, "
+            f"step {1e3 * step:g} ms; {self.advice}",
+            time=float(time[copy]),
+            steps_done=int(done[copy]) // self.substeps,
+        )
+
+    def _fastest(self, copy: int) -> str:
+        """What moves fastest in a copy, and how fast."""
+        speeds = np.nan_to_num(np.abs(self.bound("qvel")[copy]), nan=np.inf)
+        dof = int(speeds.argmax())
+        joint = self.model.joint(int(self.model.dof_jntid[dof])).name
+        return f"joint {joint!r} (speed {speeds[dof]:.3g})"
+
+
+def shifted(first: Array, after: Array, substeps: int = 1) -> Array:
+    """Samples at the start of each control step, from `after` each physics step."""
+    return np.concatenate([first[:, None], after], axis=1)[:, :-1:substeps]

@@ -1,0 +1,160 @@
+"""A body in MuJoCo: its model, and its nodes and springs in MuJoCo's numbers."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from mcmj.core.body import Body
+from mcmj.core.callbacks import install
+from mcmj.core.callbacks.leapfrog import node_velocities
+from mcmj.core.callbacks.spring_laws import spring_law
+from mcmj.core.integrators import integrator_named
+from mcmj.core.options import Options
+from mcmj.core.rollout_arguments import Drive
+from mcmj.core.trajectory import State
+from mcmj.mjcf.read import load_model
+from mcmj.mjcf.write import to_mjcf
+from mcmj.simulation.batch_engine import BatchEngine, Channels, shifted
+from mcmj.simulation.damage import alter
+from mcmj.utils.errors import InvalidArgumentError
+from mcmj.utils.validation import Array, as_array
+
+
+class BodyEngine(BatchEngine):
+    """MuJoCo's side of a simulation of a body; see Simulation for the options."""
+
+    recordable: tuple[str, ...] = ("signals", "positions", "velocities")
+
+    def __init__(self, body: Body, options: Options, *, copies: int, threads: int) -> None:
+        self.body, self.options = body, options
+        timestep, integrator, substeps = options.timestep, options.integrator, options.substeps
+        self.advice = (
+            f"try a smaller step (substeps={2 * substeps}) or another integrator ('discrete' "
+            "survives stiff dampers), or smaller forces and readout weights"
+        )
+        self._physics_step = options.physics_step
+        xml = to_mjcf(
+            body,
+            timestep=self._physics_step,
+            integrator=integrator,
+            w_out=np.zeros((body.n_springs + 1, body.n_outputs)),
+            springs=options.springs,
+            feedback_delay=options.feedback_delay * timestep,
+            control_period=timestep if substeps > 1 else 0.0,
+        )
+        law = spring_law(options.springs)
+        self._by_callback = integrator_named(integrator).by_callback
+        self._passive = law is not None or self._by_callback
+        install.install(passive=self._passive)  # first: MuJoCo's compiler calls them too
+        model = load_model(xml)
+        model.actuator_biasprm[body.n_inputs :, 0] = 0.0  # open until a drive closes it
+        if substeps > 1:  # the first sample at t = 0: MJCF takes no phase beyond a period
+            model.sensor_interval[: body.n_springs, 1] -= timestep
+        if law is not None:
+            model.tendon_user[: body.n_springs, 1] = law.key(body.n_springs)
+        channels = Channels(
+            inputs=slice(0, body.n_inputs),
+            outputs=slice(body.n_inputs, model.nu),
+            pushed=2 * np.arange(len(body.free)),  # joints are n<i>x, n<i>y in node order
+            forces=body.free,
+        )
+        super().__init__(
+            model, channels, timestep=timestep, substeps=substeps, copies=copies, threads=threads
+        )
+
+    def alter(self, cut: Sequence[int], masses: Array | None) -> None:
+        """Cut springs and change masses (N,) [kg] of all copies, for good."""
+        self._install()
+        alter(self._batch, self.body, cut, masses)
+
+    def pushes(self, forces: object) -> Array:
+        """Forces by name are for models.
+
+        Raises:
+            InvalidArgumentError: always.
+        """
+        raise InvalidArgumentError("forces", "(N,) or (T, N) on a body's nodes", "names")
+
+    # --- state -------------------------------------------------------------------------------
+
+    @property
+    def state(self) -> State:
+        """Positions and velocities (copies, N, 2) now."""
+        return State(
+            positions=self._positions(self.bound("qpos")),
+            velocities=self._velocities(self._joint_velocities()),
+            time=self.steps_done * self.timestep,
+        )
+
+    def set_state(self, positions: object, velocities: object) -> None:
+        """Positions and velocities (N, 2) for all copies, or (copies, N, 2); None: as they are."""
+        free = self.body.free
+        if self._by_callback:  # starts anew
+            self.bound("qvel")[:] = self._joint_velocities()
+            self.bound("userdata")[:] = 0.0
+        for name, value, field, origin in (
+            ("positions", positions, "qpos", self.body.positions),
+            ("velocities", velocities, "qvel", 0.0),
+        ):
+            if value is not None:
+                lead = (self.copies,) if np.asarray(value).ndim == 3 else ()
+                array = as_array(name, value, (*lead, self.body.n_nodes, 2)) - origin
+                self.bound(field)[:] = array[..., free, :].reshape(*lead, -1)
+
+    def current_signals(self) -> Array:
+        """Spring lengths (copies, L) [m] at the current state."""
+        found: Array = self.sensors_now()[:, -self.body.n_springs :].copy()
+        return found
+
+    def _positions(self, qpos: Array) -> Array:
+        """Node positions (..., N, 2) from joint positions (..., nq)."""
+        positions = np.empty((*qpos.shape[:-1], self.body.n_nodes, 2))
+        positions[:] = self.body.positions
+        positions[..., self.body.free, :] += qpos.reshape(*qpos.shape[:-1], -1, 2)
+        return positions
+
+    def _joint_velocities(self) -> Array:
+        """Best estimates (copies, nv) of the velocities now [m/s]."""
+        qvel, userdata = self.bound("qvel"), self.bound("userdata")
+        return node_velocities(qvel, userdata, self._physics_step)
+
+    def _velocities(self, qvel: Array) -> Array:
+        """Node velocities (..., N, 2) from joint velocities (..., nv)."""
+        velocities = np.zeros((*qvel.shape[:-1], self.body.n_nodes, 2))
+        velocities[..., self.body.free, :] = qvel.reshape(*qvel.shape[:-1], -1, 2)
+        return velocities
+
+    # --- stepping ----------------------------------------------------------------------------
+
+    def run(self, drive: Drive, record: tuple[str, ...], start: int, stop: int) -> dict[str, Array]:
+        """Control steps start .. stop - 1 of a drive; returns the recorded arrays.
+
+        Raises:
+            DivergenceError: a copy blew up.
+            McmjError: another package's callback is installed.
+        """
+        qpos, qvel = self.bound("qpos").copy(), self._joint_velocities().copy()
+        items = {"positions": "qpos", "velocities": "qvel", "signals": "sensordata"}
+        wanted = [items[name] for name in record]
+        if "velocities" in record:
+            wanted.append("userdata")
+        rows = self._advance(drive, start, stop, wanted)
+        recorded = {}
+        for name in record:
+            samples = rows[items[name]]
+            if name == "signals":  # sensors show the start of the step, the state its end
+                # the last L sensors are never delayed or held
+                recorded[name] = samples[:, :: self.substeps, -self.body.n_springs :]
+            elif name == "positions":
+                recorded[name] = self._positions(shifted(qpos, samples, self.substeps))
+            else:
+                after = node_velocities(samples, rows["userdata"], self._physics_step)
+                recorded[name] = self._velocities(shifted(qvel, after, self.substeps))
+        return recorded
+
+    def _fastest(self, copy: int) -> str:
+        velocities = self._velocities(self.bound("qvel")[copy])
+        with np.errstate(over="ignore"):
+            speed = np.hypot(*np.nan_to_num(velocities, nan=np.inf).T)
+        node = int(speed.argmax())
+        return f"node {node} (speed {speed[node]:.3g} m/s), integrator {self.options.integrator}"

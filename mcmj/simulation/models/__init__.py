@@ -1,0 +1,1 @@
+"""Any MuJoCo model with sensors and channels added: names, engine, file."""
