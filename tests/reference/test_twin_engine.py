@@ -102,7 +102,7 @@ def test_what_the_twin_does_not_do_is_named(body):
     with pytest.raises(UnknownNameError, match="mujoco, twin"):
         mcmj.Simulation(body, engine="jax")
     with pytest.raises(
-        UnknownNameError, match="record .positions.; valid choices: lengths, outputs"
+        UnknownNameError, match=r"record .positions.; valid choices: lengths, outputs"
     ):
         mcmj.Simulation(body, engine="twin").rollout(1, record=("positions",))
 
