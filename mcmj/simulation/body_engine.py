@@ -57,6 +57,9 @@ class BodyEngine(BatchEngine):
             outputs=slice(body.n_inputs, model.nu),
             pushed=2 * np.arange(len(body.free)),  # joints are n<i>x, n<i>y in node order
             forces=body.free,
+            # the last L sensors are never delayed or held
+            signals=np.arange(model.nsensordata - body.n_springs, model.nsensordata),
+            late=np.zeros(body.n_springs, dtype=np.bool_),
         )
         super().__init__(
             model, channels, timestep=timestep, substeps=substeps, copies=copies, threads=threads
@@ -64,8 +67,8 @@ class BodyEngine(BatchEngine):
 
     def alter(self, cut: Sequence[int], masses: Array | None) -> None:
         """Cut springs and change masses (N,) [kg] of all copies, for good."""
-        self._install()
-        alter(self._batch, self.body, cut, masses)
+        self.install()
+        alter(self.batch, self.body, cut, masses)
 
     def pushes(self, forces: object) -> Array:
         """Forces by name are for models.

@@ -38,12 +38,14 @@ class ModelEngine(BatchEngine):
             outputs=slice(first, first + n_outputs),
             pushed=dofs,
             forces=dofs,
+            signals=adopted.signals,
+            late=adopted.late,
         )
         timestep = float(adopted.model.opt.timestep)
         super().__init__(adopted.model, channels, timestep=timestep, copies=copies, threads=threads)
 
-    def _install(self) -> None:
-        super()._install()
+    def install(self) -> None:
+        super().install()
         install.install_control()
 
     def pushes(self, forces: Mapping[str, object]) -> Array:
@@ -64,7 +66,7 @@ class ModelEngine(BatchEngine):
 
     def alter(self, cut: Sequence[str], masses: Mapping[str, float] | None) -> None:
         """Tendons without force; masses [kg] of bodies, their inertia in proportion."""
-        alter_model(self._batch, self.model, cut, masses or {})
+        alter_model(self.batch, self.model, cut, masses or {})
 
     # --- state -------------------------------------------------------------------------------
 
