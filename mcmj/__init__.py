@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from mcmj.learning.teaching import teach as teach
     from mcmj.mjcf.read import from_mjcf as from_mjcf
     from mcmj.mjcf.write import to_mjcf as to_mjcf
+    from mcmj.pictures.film_of import film as film
     from mcmj.simulation.ensemble import Ensemble as Ensemble
     from mcmj.simulation.phases import Phase as Phase
     from mcmj.simulation.phases import RandomForces as RandomForces
@@ -46,6 +47,7 @@ _PLACES = {
     "SpringLaw": "core.callbacks.spring_laws",
     "Target": "targets.limit_cycles",
     "Teaching": "learning.lessons",
+    "film": "pictures.film_of",
     "fit_readout": "learning.regression",
     "from_mjcf": "mjcf.read",
     "random_body": "core.random_body",

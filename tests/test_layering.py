@@ -40,7 +40,12 @@ BELOW = {
     "simulation.stepsize",
     "simulation.models",
 }  # they import it
-ABOVE = {"simulation.trajectory_files", "learning.environments", "analysis.stability"}
+ABOVE = {
+    "analysis.stability",
+    "learning.environments",
+    "pictures.window",
+    "simulation.trajectory_files",
+}
 MOST_MODULES, MOST_ROOT_ENTRIES = 14, 16
 
 MUJOCO = {
@@ -55,7 +60,11 @@ MUJOCO = {
     "pictures.opengl",
     "pictures.opengl_view",
     "pictures.trunk_video",
-    "pictures.viewer",
+    "pictures.film",
+    "pictures.model_view",
+    "pictures.window.body_viewer",
+    "pictures.window.plots",
+    "pictures.window.viewer",
     "pictures.walk_video",
     "robots.trunk_walker",
     "robots.walk_scene",

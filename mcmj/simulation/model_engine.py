@@ -45,6 +45,7 @@ class ModelEngine(BatchEngine):
         super().__init__(adopted.model, channels, timestep=timestep, copies=copies, threads=threads)
 
     def install(self) -> None:
+        """Callbacks again, that of the reservoir's law too."""
         super().install()
         install.install_control()
 

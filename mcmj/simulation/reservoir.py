@@ -20,6 +20,7 @@ import numpy as np
 from mcmj.core.readout import Readout, is_pair, readout_rows
 from mcmj.core.rollout_arguments import Drive, check_drive
 from mcmj.core.trajectory import Trajectory, join
+from mcmj.simulation.batch_engine import BatchEngine
 from mcmj.simulation.damage import check_model_damage
 from mcmj.simulation.engines import Engine
 from mcmj.simulation.model_engine import ModelEngine
@@ -171,6 +172,19 @@ class Reservoir(OneDrive):
     def time(self) -> float:
         """Simulation time [s]."""
         return self._engine.steps_done * self._engine.timestep
+
+    @property
+    def in_mujoco(self) -> BatchEngine:
+        """MuJoCo's side: the batch, and where channels and signals are in its model.
+
+        Raises:
+            InvalidArgumentError: the engine is not MuJoCo, or there are copies.
+        """
+        if not isinstance(self._engine, BatchEngine):
+            raise InvalidArgumentError("engine", "'mujoco', which has a model", "'twin'")
+        if self._copies is not None:
+            raise InvalidArgumentError("reservoir", "one without copies", self._copies)
+        return self._engine
 
     # --- readout -----------------------------------------------------------------------------
 
