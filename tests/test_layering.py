@@ -55,6 +55,7 @@ MUJOCO = {
     "experiments.benchmark.full_scene",
     "experiments.benchmark.run",
     "experiments.limit_cycle.loop_cost",  # times bare mj_step
+    "learning.environments.environment",
     "mjcf.check",
     "mjcf.read",
     "pictures.opengl",
