@@ -25,7 +25,7 @@ class Drive:
         inputs: (..., T, n_inputs).
         offset: (..., T, n_outputs), added to the fed-back outputs.
         gate: (n_outputs,): 1 closes a feedback channel, 0 opens it.
-        forces: (..., T, N) horizontal forces on the nodes [N]; T = 1 if constant.
+        forces: (..., T, N) forces on the nodes along the body's direction [N]; T = 1 if constant.
     """
 
     steps: int

@@ -66,9 +66,9 @@ class LiveLoop:
 
     @property
     def positions(self) -> Array:
-        """Of the nodes now (N, 2) [m]."""
+        """Of the nodes now (N, D) [m]."""
         positions = self.body.positions.copy()
-        positions[self.body.free] += self._data.qpos.reshape(-1, 2)
+        positions[self.body.free] += self._data.qpos.reshape(-1, self.body.dimensions)
         return positions
 
     @property
@@ -98,11 +98,11 @@ class LiveLoop:
             data.time = self._start.time
 
     def advance(self, steps: int, forces: Array | None = None) -> None:
-        """Do steps, with constant forces (N, 2) on the nodes [N]."""
+        """Do steps, with constant forces (N, D) on the nodes [N]."""
         require_count("steps", steps, 1, MOST_STEPS)
         install.install()
         pushed = 0.0 if forces is None else forces[self.body.free]
-        self._data.xfrc_applied[self._bodies, :2] = pushed
+        self._data.xfrc_applied[self._bodies, : self.body.dimensions] = pushed
         with quiet_warnings():
             mujoco.mj_step(self._model, self._data, nstep=steps)
 

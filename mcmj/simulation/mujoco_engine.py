@@ -65,7 +65,9 @@ class Engine:
         self._batch = Batch(self.model, copies, threads)
         if threads > 1:
             guard_against_forks(self)
-        self._x_dofs = 2 * np.arange(len(body.free))  # joints are n<i>x, n<i>y in node order
+        # joints are n<i>x, n<i>y (, n<i>z) in node order
+        first = body.dimensions * np.arange(len(body.free))
+        self._pushed = [(first + i, share) for i, share in enumerate(body.direction) if share]
         self.steps_done = 0
         self.reset()
 
@@ -97,7 +99,7 @@ class Engine:
 
     @property
     def state(self) -> State:
-        """Positions and velocities (copies, N, 2) now."""
+        """Positions and velocities (copies, N, D) now."""
         return State(
             positions=self._positions(self._batch.bind("qpos")),
             velocities=self._velocities(self._joint_velocities()),
@@ -105,8 +107,8 @@ class Engine:
         )
 
     def set_state(self, positions: object, velocities: object) -> None:
-        """Positions and velocities (N, 2) for all copies, or (copies, N, 2); None: as they are."""
-        free = self.body.free
+        """Positions and velocities (N, D) for all copies, or (copies, N, D); None: as they are."""
+        free, shape = self.body.free, self.body.positions.shape
         if self._by_callback:  # starts anew
             self._batch.bind("qvel")[:] = self._joint_velocities()
             self._batch.bind("userdata")[:] = 0.0
@@ -116,7 +118,7 @@ class Engine:
         ):
             if value is not None:
                 lead = (self.copies,) if np.asarray(value).ndim == 3 else ()
-                array = as_array(name, value, (*lead, self.body.n_nodes, 2)) - origin
+                array = as_array(name, value, (*lead, *shape)) - origin
                 self._batch.bind(field)[:] = array[..., free, :].reshape(*lead, -1)
 
     def snapshot(self) -> Array:
@@ -138,10 +140,11 @@ class Engine:
         return found
 
     def _positions(self, qpos: Array) -> Array:
-        """Node positions (..., N, 2) from joint positions (..., nq)."""
-        positions = np.empty((*qpos.shape[:-1], self.body.n_nodes, 2))
+        """Node positions (..., N, D) from joint positions (..., nq)."""
+        shape = self.body.positions.shape
+        positions = np.empty((*qpos.shape[:-1], *shape))
         positions[:] = self.body.positions
-        positions[..., self.body.free, :] += qpos.reshape(*qpos.shape[:-1], -1, 2)
+        positions[..., self.body.free, :] += qpos.reshape(*qpos.shape[:-1], -1, shape[1])
         return positions
 
     def _joint_velocities(self) -> Array:
@@ -150,9 +153,10 @@ class Engine:
         return node_velocities(qvel, userdata, self._physics_step)
 
     def _velocities(self, qvel: Array) -> Array:
-        """Node velocities (..., N, 2) from joint velocities (..., nv)."""
-        velocities = np.zeros((*qvel.shape[:-1], self.body.n_nodes, 2))
-        velocities[..., self.body.free, :] = qvel.reshape(*qvel.shape[:-1], -1, 2)
+        """Node velocities (..., N, D) from joint velocities (..., nv)."""
+        shape = self.body.positions.shape
+        velocities = np.zeros((*qvel.shape[:-1], *shape))
+        velocities[..., self.body.free, :] = qvel.reshape(*qvel.shape[:-1], -1, shape[1])
         return velocities
 
     # --- stepping ----------------------------------------------------------------------------
@@ -209,7 +213,8 @@ class Engine:
                 lead = (self.copies,)
         varying = forces is not None and forces.shape[-2] > 1
         if forces is not None and not varying:
-            self._batch.bind("qfrc_applied")[:, self._x_dofs] = forces[..., 0, body.free]
+            for dofs, share in self._pushed:
+                self._batch.bind("qfrc_applied")[:, dofs] = share * forces[..., 0, body.free]
         if drive.inputs is None and drive.offset is None and not varying:
             return None, _CTRL
         n_applied = self.model.nv if varying else 0
@@ -219,7 +224,8 @@ class Engine:
         if drive.offset is not None:
             control[..., body.n_inputs : self.model.nu] = drive.offset[..., start:stop, :]
         if varying and forces is not None:
-            control[..., self.model.nu + self._x_dofs] = forces[..., start:stop, body.free]
+            for dofs, share in self._pushed:
+                control[..., self.model.nu + dofs] = share * forces[..., start:stop, body.free]
         spec = _CTRL | _APPLIED if varying else _CTRL
         return np.repeat(control, self.substeps, axis=-2), spec
 
@@ -235,7 +241,7 @@ class Engine:
         copy = dead[0]
         self.steps_done += int(done[copy]) // self.substeps
         with np.errstate(over="ignore"):
-            speed = np.hypot(*np.nan_to_num(velocities[copy], nan=np.inf).T)
+            speed = np.hypot.reduce(np.nan_to_num(velocities[copy], nan=np.inf), axis=1)
         node = int(speed.argmax())
         which = f"copy {copy}: " if self.copies > 1 else ""
         raise DivergenceError(

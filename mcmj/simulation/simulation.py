@@ -150,7 +150,7 @@ class Simulation(OneDrive):
         )
 
     def set_state(self, positions: object = None, velocities: object = None) -> None:
-        """Put the nodes at positions and velocities (N, 2) [m], [m/s]; fixed nodes stay.
+        """Put the nodes at positions and velocities (N, D) [m], [m/s]; fixed nodes stay.
 
         Raises:
             InvalidArgumentError: wrong shape, or NaN.
@@ -197,10 +197,10 @@ class Simulation(OneDrive):
             inputs: (T, n_inputs).
             offset: (T, n_outputs), added to the fed-back outputs; the teacher in teacher forcing.
             gate: (n_outputs,) or a number; default: 1 with a readout, else 0.
-            forces: (N,) or (T, N) horizontal forces on the nodes [N].
+            forces: (N,) or (T, N) forces on the nodes along the body's direction, x [N].
             record: any of "lengths", "outputs", "positions", "velocities".
             hook: slow (one Python call a control step): function (time, lengths (L,)) -> (N,)
-                horizontal forces [N] during that step, for laws that nothing else covers.
+                such forces [N] during that step, for laws that nothing else covers.
 
         Raises:
             DivergenceError: the simulation blew up.
@@ -253,6 +253,8 @@ class Simulation(OneDrive):
         name = getattr(options.springs, "name", options.springs)
         digest = hashlib.blake2b(repr(replace(options, springs=name)).encode(), digest_size=6)
         for field in fields(self.body):
+            if field.name == "direction" and self.body.pushed_along_x:
+                continue  # as before there was one
             array = getattr(self.body, field.name)
             digest.update(repr(array.shape).encode() + array.tobytes())
         return float(int.from_bytes(digest.digest()))
