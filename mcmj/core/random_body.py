@@ -112,9 +112,9 @@ def random_body(seed: int, nodes: int = 25, **settings: Any) -> Body:
 
 def draw_body(seed: int, settings: BodySettings) -> Body:
     """`random_body` from a settings object."""
-    n, size = settings.nodes, (settings.width, settings.height)
+    n, size = settings.nodes, [settings.width, settings.height]
     if settings.depth:
-        size = (*size, settings.depth)
+        size.append(settings.depth)
     positions = stream(seed, "topology").uniform(np.zeros(len(size)), size, (n, len(size)))
     springs = delaunay_springs(positions)
     fixed = held_nodes(positions)

@@ -1,4 +1,4 @@
-"""What depends on the number of dimensions of a body: its coordinates, what pushes, what holds it."""
+"""What depends on how many dimensions a body has: positions, what pushes and what holds it."""
 
 import numpy as np
 import numpy.typing as npt
@@ -49,9 +49,8 @@ def checked_direction(value: object, dimensions: int) -> Array:
         raise InvalidArgumentError("direction", "a vector that is not 0", given)
     if abs(np.linalg.norm(given) - 1.0) <= UNIT:
         return given
-    scaled = given / largest  # its length neither overflows nor underflows
-    found: Array = scaled / np.linalg.norm(scaled)
-    return found
+    given = given / largest  # now its length neither overflows nor underflows
+    return as_array("direction", given / np.linalg.norm(given), (dimensions,))
 
 
 def held_nodes(positions: Array) -> npt.NDArray[np.bool_]:

@@ -96,13 +96,13 @@ def body_of_model(model: mujoco.MjModel) -> Body:
         masses[fixed] = _shaped(stored, (int(fixed.sum()),), "fixed_masses")
     try:
         body = Body(
-            positions=positions[:, :_dimensions(model, fixed)],
+            positions=positions[:, : _dimensions(model, fixed)],
             springs=_spring_ends(model, springs, nodes),
             fixed=fixed,
             masses=masses,
             w_in=_weights(model, "in", fixed),
             w_fb=_weights(model, "fb", fixed),
-            direction=_stored(model, "direction"),
+            direction=_stored(model, "direction"),  # type: ignore[arg-type]  # None: x
             **_spring_parameters(model, springs),
         )
     except InvalidArgumentError as error:

@@ -96,7 +96,7 @@ class Viewer:
             show_left_ui=False, show_right_ui=False,
         )  # fmt: skip
         self._threads = set(threading.enumerate()) - before
-        self._look_from_above()
+        self._look()
 
     def __enter__(self) -> "Viewer":
         return self
@@ -129,10 +129,14 @@ class Viewer:
 
     # --- inside ------------------------------------------------------------------------------
 
-    def _look_from_above(self) -> None:
-        cx, cy, width, height = frame(self._loop.body)
+    def _look(self) -> None:
+        body = self._loop.body
+        cx, cy, width, height = frame(body)
         with self._handle.lock():
             camera = self._handle.cam
+            if body.dimensions == 3:
+                mujoco.mjv_defaultFreeCamera(self._model, camera)
+                return
             extent = VIEW_SHARE * max(width, height)
             camera.lookat[:] = cx + PLOTS_SHIFT * extent, cy - HELP_SHIFT * extent, 0.0
             camera.distance = extent / 2 / np.tan(np.radians(CAMERA_ANGLE / 2))
@@ -154,15 +158,17 @@ class Viewer:
                     self._loop.freeze(channel)
 
     def _dragged(self) -> Array | None:
-        """Forces (N, 2) of the spring between the mouse and the node it holds [N]."""
+        """Forces (N, D) of the spring between the mouse and the node it holds [N]."""
         pert = self._handle.perturb
         node = self._bodies.get(pert.select)
         if node is None or not pert.active:
             return None
         away = pert.refpos - self._data.xipos[pert.select]
-        forces = np.zeros((self._loop.body.n_nodes, 2))
-        # without Shift the mouse moves it along z: up on the screen, so take it for y
-        forces[node] = DRAG_STIFFNESS / self._scale * np.array([away[0], away[1] + away[2]])
+        forces = np.zeros_like(self._loop.body.positions)
+        if forces.shape[1] == 2:
+            # without Shift the mouse moves it along z: up on the screen, so take it for y
+            away = np.array([away[0], away[1] + away[2]])
+        forces[node] = DRAG_STIFFNESS / self._scale * away
         return forces
 
     def _show(self) -> None:

@@ -8,8 +8,8 @@ toolbox_euler        the authors' scheme: spring rates by backward difference,
                      x2 = (l_k - l_{k-1}) / h with l_{-1} = l0; p += h v;  v += h F/m
 toolbox_rk           the same with p += h v + h^2 F/2m, what Runge-Kutta gives for a held force
 
-Bodies in space, and those pushed along another direction than x, run by the same schemes in plain
-NumPy, a hundred times slower than compiled. In the toolbox schemes the output y_k = W_out^T l_k is fed back at step k + 1.
+In the toolbox schemes the output y_k = W_out^T l_k is fed back at step k + 1. Bodies in space, and
+those pushed along another direction than x, run by the same schemes in plain NumPy (`plain_steps`).
 """
 
 from dataclasses import replace

@@ -40,7 +40,7 @@ class Phase:
         offset: (n_outputs,) constant, added to the fed-back outputs.
         freeze: channels that go on feeding back what they fed back last; in a schedule's first
             phase, the output of that moment. They take no offset.
-        forces: (N,) constant horizontal forces on the nodes [N], or RandomForces.
+        forces: (N,) constant forces on the nodes along the body's direction [N], or RandomForces.
         length_noise: standard deviation of white noise, new every step, on the lengths that
             the readout sees [m].
         w_out: readout to switch to, for this phase and all after it.

@@ -118,7 +118,9 @@ class Orbit(base.Task):
         """Rest or a point of the cycle, kicked."""
         install.install(passive=self.setting.passive)  # another package may have taken them out
         free = physics.body.free
-        velocities = self.setting.kick * self.random.standard_normal((len(free), 2))
+        velocities = self.setting.kick * self.random.standard_normal(
+            (len(free), physics.body.dimensions)
+        )
         if self._first is not None:
             physics.data.time = self._first.time
             moved = self._first.positions - physics.body.positions
