@@ -16,11 +16,11 @@ from mcmj.utils.seeds import stream
 from mcmj.utils.validation import Array, as_array, require_count, require_number, require_range
 
 Range = tuple[float, float]
-# by dimensions: what points must span, and do not, and Qhull's options: SciPy's own in the plane;
-# in space without Qz, which adds a point at infinity
-SIMPLICES: dict[int, tuple[str, str, str | None]] = {
-    2: ("plane", "collinear", None),
-    3: ("space", "coplanar", "Qbb Qc Q12"),
+# by dimensions: the fewest points, what they must span, and do not, and Qhull's options: SciPy's
+# own in the plane; in space without Qz, which adds a point at infinity, and so takes five
+SIMPLICES: dict[int, tuple[int, str, str, str | None]] = {
+    2: (3, "plane", "collinear", None),
+    3: (5, "space", "coplanar", "Qbb Qc Q12"),
 }
 MOST_NODES, MOST_CHANNELS = 100_000, 1000  # more would fill the memory before anything runs
 
@@ -71,7 +71,7 @@ class BodySettings:
 
     def __post_init__(self) -> None:
         require_number("depth", self.depth, 0.0)
-        require_count("nodes", self.nodes, 4 if self.depth else 3, MOST_NODES)
+        require_count("nodes", self.nodes, SIMPLICES[3 if self.depth else 2][0], MOST_NODES)
         require_count("n_inputs", self.n_inputs, 0, MOST_CHANNELS)
         require_count("n_outputs", self.n_outputs, 0, MOST_CHANNELS)
         for name in ("width", "height", "input_scale", "feedback_scale"):
@@ -150,15 +150,16 @@ def delaunay_springs(positions: npt.ArrayLike) -> npt.NDArray[np.int64]:
     """Edges (L, 2) of the Delaunay triangulation of (N, D) points, each once, sorted.
 
     Raises:
-        InvalidArgumentError: fewer than D + 1 points, or all on one line (D = 2) or plane (3).
+        InvalidArgumentError: fewer than 3 points in the plane or 5 in space, or all on one line
+            or plane.
     """
     points = as_array("positions", positions, (None, None))
     dimensions = points.shape[1]
     if dimensions not in SIMPLICES:
         raise InvalidArgumentError("positions", "points (N, 2) or (N, 3)", points.shape)
-    if len(points) <= dimensions:
-        raise InvalidArgumentError("positions", f"at least {dimensions + 1} points", len(points))
-    kind, flat, options = SIMPLICES[dimensions]
+    least, kind, flat, options = SIMPLICES[dimensions]
+    if len(points) < least:
+        raise InvalidArgumentError("positions", f"at least {least} points", len(points))
     try:
         corners = Delaunay(points, qhull_options=options).simplices
     except QhullError as error:

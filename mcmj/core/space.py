@@ -41,16 +41,16 @@ def checked_direction(value: object, dimensions: int) -> Array:
     Raises:
         InvalidArgumentError: another shape, not finite, or 0.
     """
-    if value is None:
-        return np.eye(dimensions)[0]
-    given = as_array("direction", value, (dimensions,)) + 0.0  # no negative zeros
+    wanted = np.eye(1, dimensions).ravel() if value is None else value
+    given = as_array("direction", wanted, (dimensions,))
     largest = np.abs(given).max()
     if largest == 0.0:
         raise InvalidArgumentError("direction", "a vector that is not 0", given)
-    if abs(np.linalg.norm(given) - 1.0) <= UNIT:
-        return given
-    given = given / largest  # now its length neither overflows nor underflows
-    return as_array("direction", given / np.linalg.norm(given), (dimensions,))
+    if not 0.5 <= largest <= 1.0:
+        given = given / largest  # now its length neither overflows nor underflows
+    if abs(np.linalg.norm(given) - 1.0) > UNIT:
+        given = given / np.linalg.norm(given)
+    return given + 0.0  # no negative zeros
 
 
 def held_nodes(positions: Array) -> npt.NDArray[np.bool_]:
