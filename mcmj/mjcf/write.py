@@ -200,8 +200,14 @@ def _add_push(tendons: ET.Element, name: str, body: Body, weights: Array) -> Non
     for i in pushed:
         for axis, share in zip(AXES, body.direction, strict=False):
             if share != 0.0:
-                joint, coef = f"n{i}{axis}", numbers(weights[i] * share)
-                ET.SubElement(fixed, "joint", joint=joint, coef=coef)
+                coef = weights[i] if share == 1.0 else _product(weights[i], share)
+                ET.SubElement(fixed, "joint", joint=f"n{i}{axis}", coef=numbers(coef))
+
+
+def _product(weight: float, share: float) -> float:
+    """0 where it would be subnormal, which MuJoCo does not read."""
+    product = weight * share
+    return product if abs(product) >= np.finfo(float).tiny else 0.0
 
 
 def _add_sensors(
