@@ -35,10 +35,10 @@ def integrate_plain(
     state = replace(start, velocities=velocities)
     fed_back = np.zeros(body.n_outputs) if start.pending_output is None else start.pending_output
     for k in range(steps):
-        lengths[k] = spring_lengths(state.positions, body.springs)
-        outputs[k] = readout.outputs(lengths[k])
-        push = held_push(body, drive, fed_back if method in TOOLBOX else outputs[k], k)
         with np.errstate(all="ignore"):  # a body that diverges overflows, and is reported below
+            lengths[k] = spring_lengths(state.positions, body.springs)
+            outputs[k] = readout.outputs(lengths[k])
+            push = held_push(body, drive, fed_back if method in TOOLBOX else outputs[k], k)
             after = STEPS[method](body, state, push, timestep)
         if not (np.isfinite(after.positions).all() and np.isfinite(after.velocities).all()):
             raise _divergence(state, method, timestep, start.time, k)

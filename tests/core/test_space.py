@@ -73,7 +73,7 @@ def test_the_planar_draws_do_not_know_of_a_depth():
 
 @pytest.mark.parametrize("depth", [-1.0, np.inf, True])
 def test_a_bad_depth_is_refused(depth):
-    with pytest.raises(InvalidArgumentError, match="^depth: "):
+    with pytest.raises(InvalidArgumentError, match=r"^depth: "):
         mcmj.random_body(0, depth=depth)
 
 
@@ -82,7 +82,7 @@ def test_points_that_span_no_space_are_refused():
         delaunay_springs(np.column_stack([np.random.default_rng(0).random((6, 2)), np.ones(6)]))
     with pytest.raises(InvalidArgumentError, match="at least 5 points"):
         delaunay_springs(np.eye(4, 3))
-    with pytest.raises(InvalidArgumentError, match="^nodes: "):
+    with pytest.raises(InvalidArgumentError, match=r"^nodes: "):
         mcmj.random_body(0, nodes=4, depth=1.0)
 
 
