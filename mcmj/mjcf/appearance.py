@@ -107,13 +107,14 @@ def _heights(body: Body) -> tuple[float, float]:
 
 
 def _add_oblique_camera(world: ET.Element, body: Body) -> None:
-    """A camera in the direction OBLIQUE, so far away that it sees the box around the body."""
+    """A camera in the direction OBLIQUE, so far away that it sees the ball around the body."""
     low, high = body.positions.min(axis=0), body.positions.max(axis=0)
-    radius = (0.5 + MARGIN) * np.linalg.norm(high - low)
+    centre = (low + high) / 2
+    radius = (1.0 + MARGIN) * np.linalg.norm(body.positions - centre, axis=1).max()
     azimuth, elevation = np.radians(OBLIQUE)
     ahead = np.array([np.cos(azimuth), np.sin(azimuth), np.tan(elevation)]) * np.cos(elevation)
     right = np.array([np.sin(azimuth), -np.cos(azimuth), 0.0])
-    place = (low + high) / 2 - radius / np.sin(np.radians(CAMERA_ANGLE / 2)) * ahead
+    place = centre - radius / np.sin(np.radians(CAMERA_ANGLE / 2)) * ahead
     ET.SubElement(
         world,
         "camera",
