@@ -20,12 +20,12 @@ class State:
     """Where the nodes are and how fast they move; what an engine needs to go on.
 
     Attributes:
-        positions, velocities: (N, 2) [m], [m/s].
+        positions, velocities: (N, D) [m], [m/s], D = 2 or 3.
         time: [s].
         previous_lengths: (L,) spring lengths one step earlier [m] (toolbox scheme only).
         pending_output: (n_outputs,) output still to be fed back (toolbox scheme only).
-        history: (N, 7), the compiled leapfrog only: `velocities` again, the velocities that
-            dampers see next and those half a step back [m/s], the last push [N]. Whoever
+        history: (N, 3 D + 1), the reference's leapfrog only: `velocities` again, the velocities
+            that dampers see next and those half a step back [m/s], the last push [N]. Whoever
             changes `velocities` makes it void: the scheme then starts anew from them.
     """
 
@@ -49,7 +49,7 @@ class Trajectory:
         times: (T,) [s].
         lengths: (T, L) spring lengths [m]; of any other model the signals (T, n_signals).
         outputs: (T, n_outputs), zeros without a readout.
-        positions, velocities: (T, N, 2) [m], [m/s].
+        positions, velocities: (T, N, D) [m], [m/s].
         qpos, qvel: (T, nq), (T, nv) of a model that is no Body.
         sensordata: (T, nsensordata) all sensors of such a model, as MuJoCo computed them in step k.
         final_state: state after the last step.

@@ -112,9 +112,10 @@ class Film(Recording):
 
     Attributes:
         times: (T,) [s].
-        positions: (T, N, 2) [m].
+        positions: (T, N, D) [m].
         outputs: (T, n_outputs); with none there is no phase portrait.
-        forces: (T, N) horizontal forces on the nodes [N], drawn as arrows; None: no arrows.
+        forces: (T, N) forces on the nodes along the body's direction [N], drawn as arrows; None:
+            no arrows.
         orbit: (P, n_outputs) of the target, drawn in red; None: no target.
         windows: stretches of time that are marked.
         deformation: displacements are drawn this many times larger; None: a round factor that
@@ -136,7 +137,7 @@ class Film(Recording):
     def __post_init__(self) -> None:
         self._check()
         n, n_nodes = len(self.times), self.body.n_nodes
-        as_array("positions", self.positions, (n, n_nodes, 2))
+        as_array("positions", self.positions, (n, n_nodes, self.body.dimensions))
         as_array("outputs", self.outputs, (n, self.body.n_outputs))
         if self.forces is not None:
             as_array("forces", self.forces, (n, n_nodes))
@@ -170,7 +171,7 @@ class Film(Recording):
         return largest
 
     def drawn_positions(self, index: int) -> Array:
-        """Node positions (N, 2) [m] as drawn, displacements magnified."""
+        """Node positions (N, D) [m] as drawn, displacements magnified."""
         rest = self.body.positions
         found: Array = rest + self.scale * (self.positions[index] - rest)
         return found
@@ -180,7 +181,7 @@ class Film(Recording):
         return strain_colours(strains(self.body, self.positions[index]), self.largest_strain)
 
     def arrows(self, index: int) -> Array:
-        """Lengths (N,) [m] of the horizontal arrows as drawn, positive to the right."""
+        """Lengths (N,) [m] of the arrows as drawn, positive along the body's direction."""
         if self.forces is None or self.largest_force == 0.0:
             return np.zeros(self.body.n_nodes)
         longest = ARROW_SHARE * max(frame(self.body)[2:])
@@ -189,12 +190,12 @@ class Film(Recording):
 
 
 def strains(body: Body, positions: Array) -> Array:
-    """(l - l0) / l0 (..., L) of the springs with the nodes at positions (..., N, 2)."""
+    """(l - l0) / l0 (..., L) of the springs with the nodes at positions (..., N, D)."""
     return spring_lengths(positions, body.springs) / body.rest_lengths - 1.0
 
 
 def deformation_scale(body: Body, positions: Array) -> float:
-    """A round factor (1, 2, 5, 10, ..) that makes displacements (T, N, 2) visible."""
+    """A round factor (1, 2, 5, 10, ..) that makes displacements (T, N, D) visible."""
     largest = np.abs(positions - body.positions).max()
     if largest == 0.0:
         return 1.0

@@ -217,7 +217,7 @@ def limit_cycle_video(
     """MP4 in real time: the body computing, beside its phase portrait drawing itself.
 
     Args:
-        times, positions, outputs: the same T control steps: (T,), (T, N, 2), (T, n_outputs).
+        times, positions, outputs: the same T control steps: (T,), (T, N, D), (T, n_outputs).
         seconds: length of the video, from the first sample on.
 
     Raises:

@@ -10,7 +10,7 @@ import mujoco
 import numpy as np
 from mujoco.batch import Batch
 
-from mcmj.core.body import Body
+from mcmj.core.body import Body, require_plane
 from mcmj.core.callbacks import install
 from mcmj.core.callbacks.pointers import TAG
 from mcmj.core.integrators import DEFAULT_INTEGRATOR
@@ -62,6 +62,7 @@ class Walker:
         integrator: str = DEFAULT_INTEGRATOR,
         copies: int = 1,
     ) -> None:
+        require_plane(body, "a walker")
         require_number("coupling", coupling, -np.inf)
         require_count("copies", copies, 1)
         self.taught, self.robot, self.pace, self.coupling = body, robot, pace, coupling

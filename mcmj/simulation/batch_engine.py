@@ -5,6 +5,7 @@ common: the state, the drive, and the check that the numbers are finite. Arrays 
 their first axis.
 """
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import mujoco
@@ -31,16 +32,16 @@ class Channels(NamedTuple):
 
     Attributes:
         inputs, outputs: the actuators of inputs and of feedback channels.
-        pushed: degrees of freedom that forces act on, and ..
-        forces: .. which column of the forces acts on each.
+        forces: which columns of the forces act.
+        pushed: the degrees of freedom that each of them acts on, and its share there.
         signals: (n_signals,) where they stand in sensordata.
         late: (n_signals,) bool: MuJoCo computes it after actuation.
     """
 
     inputs: slice
     outputs: slice
-    pushed: npt.NDArray[np.int64]
     forces: npt.NDArray[np.int64]
+    pushed: Sequence[tuple[npt.NDArray[np.int64], float]]
     signals: npt.NDArray[np.int64]
     late: npt.NDArray[np.bool_]
 
@@ -161,7 +162,8 @@ class BatchEngine:
                 lead = (self.copies,)
         varying = forces is not None and forces.shape[-2] > 1
         if forces is not None and not varying:
-            self.bound("qfrc_applied")[:, at.pushed] = forces[..., 0, at.forces]
+            for dofs, share in at.pushed:
+                self.bound("qfrc_applied")[:, dofs] = share * forces[..., 0, at.forces]
         if drive.inputs is None and drive.offset is None and not varying:
             return None, _CTRL
         nu, n_applied = self.model.nu, self.model.nv if varying else 0
@@ -170,7 +172,8 @@ class BatchEngine:
             if rows is not None:
                 control[..., place] = rows[..., start:stop, :]
         if varying and forces is not None:
-            control[..., nu + at.pushed] = forces[..., start:stop, at.forces]
+            for dofs, share in at.pushed:
+                control[..., nu + dofs] = share * forces[..., start:stop, at.forces]
         spec = _CTRL | _APPLIED if varying else _CTRL
         return np.repeat(control, self.substeps, axis=-2), spec
 

@@ -36,8 +36,8 @@ class ModelEngine(BatchEngine):
         channels = Channels(
             inputs=slice(first + n_outputs, first + n_outputs + len(adopted.input_names)),
             outputs=slice(first, first + n_outputs),
-            pushed=dofs,
             forces=dofs,
+            pushed=[(dofs, 1.0)],
             signals=adopted.signals,
             late=adopted.late,
         )

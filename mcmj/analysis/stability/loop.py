@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from mcmj.core.body import Body, spring_lengths
+from mcmj.core.body import Body, require_plane, spring_lengths
 from mcmj.core.readout import Readout, checked_readout
 from mcmj.core.rollout_arguments import check_drive
 from mcmj.core.trajectory import State
@@ -42,7 +42,7 @@ class ClosedLoop:
     """A trained body under its own readout.
 
     Attributes:
-        body: the body.
+        body: the body, planar and pushed along x.
         w_out: readout (L, n_outputs), or with a bias in the last row; None: open loop.
         timestep: control and physics step [s].
         threads: results do not depend on them.
@@ -57,6 +57,7 @@ class ClosedLoop:
     threads: int = 1
 
     def __post_init__(self) -> None:
+        require_plane(self.body, "the analysis of a closed loop")
         require_number("timestep", self.timestep, 0.0, open_low=True)
         require_count("threads", self.threads, 1)
         if self.w_out is not None:

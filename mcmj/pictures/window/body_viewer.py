@@ -55,10 +55,13 @@ class BodyViewer(Viewer):
         return model, mujoco.MjData(model)
 
     def _look(self) -> None:
-        """From above."""
+        """From above; at a body in space from aside."""
         cx, cy, width, height = frame(self._body)
         with self._handle.lock():
             camera = self._handle.cam
+            if self._body.dimensions == 3:
+                mujoco.mjv_defaultFreeCamera(self._model, camera)
+                return
             extent = VIEW_SHARE * max(width, height)
             camera.lookat[:] = cx + PLOTS_SHIFT * extent, cy - HELP_SHIFT * extent, 0.0
             camera.distance = extent / 2 / np.tan(np.radians(CAMERA_ANGLE / 2))
@@ -73,15 +76,16 @@ class BodyViewer(Viewer):
             return None
         away = held.refpos - self._data.xipos[held.select]
         pushes = np.zeros((self._loop.model.nbody, 6))
-        # without Shift the mouse moves it along z: up on the screen, so take it for y
-        force = DRAG_STIFFNESS / self._scale * np.array([away[0], away[1] + away[2]])
-        pushes[self._loop.model.body(f"n{node}").id, :2] = force
+        if self._body.dimensions == 2:
+            # without Shift the mouse moves it along z: up on the screen, so take it for y
+            away = np.array([away[0], away[1] + away[2], 0.0])
+        pushes[self._loop.model.body(f"n{node}").id, :3] = DRAG_STIFFNESS / self._scale * away
         return pushes
 
     def _show(self) -> None:
         body, moved = self._body, self._loop.data.qpos
         positions = body.positions.copy()
-        positions[body.free] += moved.reshape(-1, 2)
+        positions[body.free] += moved.reshape(-1, body.dimensions)
         strain = strains(body, positions)
         self._largest = max(self._largest, float(np.abs(strain).max()))
         self._data.qpos[:] = self._scale * moved
