@@ -123,7 +123,7 @@ def force_learn(
     """
     teacher = _Teacher(simulation, target, learning, seed, on_steps)
     learner = teacher.begin(stand)
-    best, errors = (simulation.readout.rows, simulation.snapshot()), []
+    best, errors = (simulation.readout.rows, simulation.snapshot()), list[float]()
     for _ in range(learning.rounds):
         try:
             if errors and np.isinf(errors[-1]):
@@ -236,10 +236,8 @@ class _Teacher:
 
     def _stretches(self, duration: float, lead_from: float | None = None) -> Iterator[Stretch]:
         """What drives the next steps: noise, and from a time [s] on the teacher."""
-        step, first = (
-            self._simulation.timestep,
-            round(self._simulation.time / self._simulation.timestep),
-        )
+        step = self._simulation.timestep
+        first = round(self._simulation.time / step)
         total, longest = round(duration / step), max(1, CHUNK // self._every) * self._every
         for start in range(0, total, longest):
             count = min(longest, total - start)

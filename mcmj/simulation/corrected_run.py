@@ -4,11 +4,13 @@ It has an MjModel and MjData of its own: the state moves there and, at the end, 
 The law, its sensors and all callbacks are those of any other run.
 """
 
-from collections.abc import Iterable
-from typing import NamedTuple
+from collections.abc import Callable, Iterable
+from functools import partial
+from typing import Any, NamedTuple
 
 import mujoco
 import numpy as np
+from mujoco.batch import Batch
 
 from mcmj.core.callbacks import install
 from mcmj.core.callbacks.library import function_address
@@ -42,12 +44,21 @@ class Stretch(NamedTuple):
 
 
 class _Layout(NamedTuple):
-    """Where readout and channels are in a model: actuators, sensordata, late signals."""
+    """A simulation's model, and where in it readout and channels are.
 
+    Attributes:
+        batch: MuJoCo's, of one simulation.
+        install: puts the callbacks in.
+        outputs, inputs: actuators of the channels.
+        signals, late, substeps: as in Machine.
+    """
+
+    batch: Batch
+    install: Callable[[], None]
     outputs: slice
     inputs: slice
-    signals: Array
-    late: Array
+    signals: Any
+    late: Any
     substeps: int
 
 
@@ -79,15 +90,14 @@ def run_corrected(
     with simulation._only_drive():
         simulation.restore(simulation.snapshot())  # late signals are then part of the state
         snapshot = simulation.snapshot()
-        batch = _engine(simulation)._batch
-        model = batch.get_model(0)
+        model = layout.batch.get_model(0)
         model.actuator_biasprm[layout.outputs, 0] = gate
         data = _data_at(model, snapshot.ravel(), layout)
         machine = _machine(model, data, layout)
         write_weights(machine, learner)
         done = 0
         for stretch in stretches:
-            _install(simulation)  # somebody may have taken it out meanwhile
+            layout.install()  # somebody may have taken it out meanwhile
             controls = _controls(model.nu, layout, stretch)
             time = data.time
             with quiet_warnings():
@@ -102,30 +112,33 @@ def run_corrected(
     simulation.set_readout(model.actuator_user[layout.outputs, : signals + 1].T.copy())
 
 
-def _engine(simulation: Simulation | Reservoir) -> Engine | Reservoir:
-    return simulation if isinstance(simulation, Reservoir) else simulation._engine
-
-
 def _layout(simulation: Simulation | Reservoir) -> _Layout:
     if isinstance(simulation, Reservoir):
-        adopted, first = simulation._adopted, simulation._outputs_at.stop
-        inputs = slice(first, first + len(adopted.input_names))
-        return _Layout(simulation._outputs_at, inputs, adopted.signals, adopted.late, 1)
+        adopted, outputs = simulation._adopted, simulation._outputs_at
+        return _Layout(
+            batch=simulation._batch,
+            install=install.install_control,
+            outputs=outputs,
+            inputs=slice(outputs.stop, outputs.stop + len(adopted.input_names)),
+            signals=adopted.signals,
+            late=adopted.late,
+            substeps=1,
+        )
     engine = simulation._engine
-    if not isinstance(engine, Engine) or engine.copies > 1:
-        raise InvalidArgumentError("simulation", "one of MuJoCo, to learn while it runs", engine)
-    n, body = engine.model.nsensordata, engine.body
-    lengths = np.arange(n - body.n_springs, n)  # the last ones are never delayed or held
-    outputs = slice(body.n_inputs, body.n_inputs + body.n_outputs)
-    late = np.zeros(body.n_springs, dtype=np.bool_)
-    return _Layout(outputs, slice(0, body.n_inputs), lengths, late, engine.substeps)
-
-
-def _install(simulation: Simulation | Reservoir) -> None:
-    if isinstance(simulation, Reservoir):
-        install.install_control()
-    else:
-        install.install(passive=simulation._engine._passive)
+    if not isinstance(engine, Engine):
+        raise InvalidArgumentError("engine", "'mujoco', to learn in closed loop", "'twin'")
+    if engine.copies > 1:
+        raise InvalidArgumentError("simulation", "a single one", f"{engine.copies} copies")
+    body, end = engine.body, engine.model.nsensordata
+    return _Layout(
+        batch=engine._batch,
+        install=partial(install.install, passive=engine._passive),
+        outputs=slice(body.n_inputs, body.n_inputs + body.n_outputs),
+        inputs=slice(0, body.n_inputs),
+        signals=np.arange(end - body.n_springs, end),  # the last are never delayed or held
+        late=np.zeros(body.n_springs, dtype=np.bool_),
+        substeps=engine.substeps,
+    )
 
 
 def _data_at(model: mujoco.MjModel, snapshot: Array, layout: _Layout) -> mujoco.MjData:
