@@ -19,7 +19,7 @@ from mcmj.learning.lessons import Teachable, require_washout
 from mcmj.learning.recursive_regression import learner_after
 from mcmj.learning.regression import Regression
 from mcmj.metrics import orbits
-from mcmj.simulation.corrected_run import Stretch, run_corrected
+from mcmj.simulation.corrected_run import Stretch, check_correctable, run_corrected
 from mcmj.simulation.reservoir import Reservoir
 from mcmj.simulation.simulation import CHUNK
 from mcmj.targets.limit_cycles import Target
@@ -31,6 +31,7 @@ from mcmj.utils.validation import Array, require_count, require_duration, requir
 RAMP = 1.0  # s over which a teacher begins
 
 Failed = Callable[[Trajectory], bool]
+Start = Array | Callable[[], object] | None
 
 
 @dataclass(frozen=True)
@@ -101,7 +102,7 @@ def force_learn(
     learning: ForceLearning,
     *,
     seed: int,
-    stand: Array | Callable[[], object] | None = None,
+    stand: Start = None,
     failed: Failed | None = None,
     on_steps: OnSteps = lambda steps: None,
 ) -> Learned:
@@ -121,6 +122,7 @@ def force_learn(
         DivergenceError: the simulation blew up in its first round.
         InvalidArgumentError: the engine is the twin.
     """
+    check_correctable(simulation)
     teacher = _Teacher(simulation, target, learning, seed, on_steps)
     learner = teacher.begin(stand)
     best, errors = (simulation.readout.rows, simulation.snapshot()), list[float]()
@@ -193,7 +195,7 @@ class _Teacher:
         self._hold = max(1, round(learning.noise_hold / step))
         self._noise = learning.noise * radius / np.sqrt(target.n_outputs)
 
-    def begin(self, stand: Array | Callable[[], object] | None) -> Learner:
+    def begin(self, stand: Start) -> Learner:
         """The teacher drives and a regression learns, with which the simulation then goes on."""
         start, regression = self._stand(stand), Regression(bias=True)
         for stretch in self._stretches(self._learning.warm_up - self._learning.washout, start):
@@ -204,7 +206,7 @@ class _Teacher:
         run_corrected(self._simulation, learner, (), every=self._every)  # the readout, for now
         return learner
 
-    def lead_again(self, stand: Array | Callable[[], object] | None, learner: Learner) -> None:
+    def lead_again(self, stand: Start, learner: Learner) -> None:
         """The same, with what was learned before."""
         start = self._stand(stand)
         stretches = self._stretches(self._learning.warm_up - self._learning.washout, start)
@@ -220,7 +222,7 @@ class _Teacher:
             every=self._every, gate=gate, on_steps=self._on_steps,
         )  # fmt: skip
 
-    def _stand(self, stand: Array | Callable[[], object] | None) -> float:
+    def _stand(self, stand: Start) -> float:
         """Where a run begins, and the washout from there; the time [s] at which it began."""
         if callable(stand):
             stand()

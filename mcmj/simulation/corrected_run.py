@@ -112,6 +112,15 @@ def run_corrected(
     simulation.set_readout(model.actuator_user[layout.outputs, : signals + 1].T.copy())
 
 
+def check_correctable(simulation: Simulation | Reservoir) -> None:
+    """Raise unless `run_corrected` can run it.
+
+    Raises:
+        InvalidArgumentError: the engine is the twin, or an ensemble.
+    """
+    _layout(simulation)
+
+
 def _layout(simulation: Simulation | Reservoir) -> _Layout:
     if isinstance(simulation, Reservoir):
         adopted, outputs = simulation._adopted, simulation._outputs_at
