@@ -15,13 +15,13 @@ import numpy as np
 
 from mcmj.core.callbacks.online_learning import Learner
 from mcmj.core.trajectory import Trajectory
-from mcmj.learning.lessons import Teachable, require_washout
+from mcmj.learning.lessons import require_washout
 from mcmj.learning.recursive_regression import learner_after
 from mcmj.learning.regression import Regression
 from mcmj.metrics import orbits
-from mcmj.simulation.corrected_run import Stretch, check_correctable, run_corrected
-from mcmj.simulation.reservoir import Reservoir
-from mcmj.simulation.simulation import CHUNK
+from mcmj.simulation.corrected_run import Stretch, run_corrected
+from mcmj.simulation.reservoir import CHUNK, Reservoir
+from mcmj.simulation.simulation import Simulation
 from mcmj.targets.limit_cycles import Target
 from mcmj.utils.errors import DivergenceError
 from mcmj.utils.progress import OnSteps
@@ -55,7 +55,7 @@ class ForceLearning:
     """
 
     period: float = 5e-3
-    ridge: float = 1e-4
+    ridge: float = 1e-2
     warm_up: float = 6.0
     washout: float = 3.0
     noise: float = 0.1
@@ -97,7 +97,7 @@ class Learned:
 
 
 def force_learn(
-    simulation: Teachable,
+    simulation: Reservoir,
     target: Target,
     learning: ForceLearning,
     *,
@@ -122,7 +122,6 @@ def force_learn(
         DivergenceError: the simulation blew up in its first round.
         InvalidArgumentError: the engine is the twin.
     """
-    check_correctable(simulation)
     teacher = _Teacher(simulation, target, learning, seed, on_steps)
     learner = teacher.begin(stand)
     best, errors = (simulation.readout.rows, simulation.snapshot()), list[float]()
@@ -148,7 +147,7 @@ def force_learn(
 
 
 def trial_error(
-    simulation: Teachable,
+    simulation: Reservoir,
     target: Target,
     duration: float,
     failed: Failed | None = None,
@@ -161,7 +160,7 @@ def trial_error(
         duration: [s].
         failed, on_steps: as for `force_learn`.
     """
-    place = "qpos" if isinstance(simulation, Reservoir) else "positions"
+    place = "positions" if isinstance(simulation, Simulation) else "qpos"
     record = ("outputs", place) if failed else ("outputs",)
     steps, kept, done = round(duration / simulation.timestep), [], 0
     try:
@@ -182,7 +181,7 @@ class _Teacher:
 
     def __init__(
         self,
-        simulation: Teachable,
+        simulation: Reservoir,
         target: Target,
         learning: ForceLearning,
         seed: int,
@@ -190,7 +189,10 @@ class _Teacher:
     ) -> None:
         self._simulation, self._target, self._learning = simulation, target, learning
         self._rng, self._on_steps = stream(seed, "teacher_noise"), on_steps
-        step, radius = simulation.timestep, orbits.rms_radius(target.orbit(orbits.ORBIT_POINTS))
+        step, radius = (
+            simulation.in_mujoco.timestep,
+            orbits.rms_radius(target.orbit(orbits.ORBIT_POINTS)),
+        )
         self._every = max(1, round(learning.period / step))
         self._hold = max(1, round(learning.noise_hold / step))
         self._noise = learning.noise * radius / np.sqrt(target.n_outputs)

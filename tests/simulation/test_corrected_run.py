@@ -36,7 +36,7 @@ def body(**options):
 
 
 def places(simulation):
-    """Signals in sensordata, and the actuators of the outputs."""
+    """Signals in sensordata, and the first actuator of the outputs."""
     model = simulation.model
     if isinstance(simulation, mcmj.Simulation):
         springs, inputs = simulation.body.n_springs, simulation.body.n_inputs
@@ -88,8 +88,7 @@ def by_hand(simulation, learner, drive, gate, late=()):
 
 def state_of(simulation):
     """Positions and speeds of the joints after the run."""
-    n, m = simulation.model.nq, simulation.model.nv
-    return simulation.snapshot().ravel()[1 : 1 + n + m]
+    return np.append(simulation.qpos, simulation.qvel)
 
 
 @pytest.mark.parametrize("integrator", ["Euler", "RK4"])

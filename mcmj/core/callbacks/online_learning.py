@@ -39,7 +39,7 @@ class Machine(NamedTuple):
     Attributes:
         step, model, data: addresses of mj_step, mjModel and mjData.
         substeps: physics steps in a control step.
-        ctrl: of the actuators that are driven.
+        ctrl: of all actuators.
         sensors: sensordata.
         speeds: qvel.
         warnings: how often MuJoCo warned of numbers that are not finite, by kind.
@@ -81,7 +81,7 @@ def advance(machine, learner, controls, targets, every):
     """Take control steps and correct the readout; the state is the machine's.
 
     Args:
-        controls: (T, machine.ctrl.size) ctrl of every step.
+        controls: (T, machine.ctrl.size) ctrl of every step, of all actuators.
         targets: (n, n_outputs) y*, one row for each correction.
         every: steps from one correction to the next; the first is at the first step.
 

@@ -44,10 +44,9 @@ class LearnedGait:
         robot.restore(self.learned.state)
         if timestep == robot.timestep:
             return robot
-        now = robot.rollout(1, record=("qpos", "qvel"))
         other = new_robot(self.trunk, timestep=timestep)
         other.set_readout(self.learned.w_out)
-        other.set_state(now.get("qpos")[0], now.get("qvel")[0])
+        other.set_state(robot.qpos, robot.qvel)
         return other
 
 
