@@ -14,14 +14,13 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from mcmj.core.callbacks.online_learning import Learner
-from mcmj.core.trajectory import Trajectory
 from mcmj.learning.lessons import require_washout
 from mcmj.learning.recursive_regression import learner_after
 from mcmj.learning.regression import Regression
+from mcmj.learning.trial import Failed, trial_error
 from mcmj.metrics import orbits
 from mcmj.simulation.corrected_run import Stretch, run_corrected
 from mcmj.simulation.reservoir import CHUNK, Reservoir
-from mcmj.simulation.simulation import Simulation
 from mcmj.targets.limit_cycles import Target
 from mcmj.utils.errors import DivergenceError
 from mcmj.utils.progress import OnSteps
@@ -30,7 +29,6 @@ from mcmj.utils.validation import Array, require_count, require_duration, requir
 
 RAMP = 1.0  # s over which a teacher begins
 
-Failed = Callable[[Trajectory], bool]
 Start = Array | Callable[[], object] | None
 
 
@@ -113,9 +111,8 @@ def force_learn(
         seed: of the noise.
         stand: where the teacher begins: a snapshot, or a function that brings the simulation
             there; default: its reset.
-        failed: whether a stretch of a trial (outputs; positions or qpos) shows that it failed,
-            by a fall say. A trial that fails or blows up has an infinite error, and the teacher
-            leads again.
+        failed: whether a part of a trial shows that it failed, by a fall say; the teacher then
+            leads again, as after a blow-up. See mcmj.learning.trial.
         on_steps: called with the number of steps done, for progress bars.
 
     Raises:
@@ -144,36 +141,6 @@ def force_learn(
     simulation.set_readout(best[0])
     simulation.restore(best[1])
     return Learned(best[0], tuple(errors), best[1])
-
-
-def trial_error(
-    simulation: Reservoir,
-    target: Target,
-    duration: float,
-    failed: Failed | None = None,
-    *,
-    on_steps: OnSteps = lambda steps: None,
-) -> float:
-    """Orbit error of the outputs in the last half of a free run; infinite if it fails.
-
-    Args:
-        duration: [s].
-        failed, on_steps: as for `force_learn`.
-    """
-    place = "positions" if isinstance(simulation, Simulation) else "qpos"
-    record = ("outputs", place) if failed else ("outputs",)
-    steps, kept, done = round(duration / simulation.timestep), [], 0
-    try:
-        for part in simulation.stream(steps, record=record):
-            if failed is not None and failed(part):
-                return np.inf
-            done += len(part)
-            if done > steps // 2:
-                kept.append(part.get("outputs"))
-            on_steps(len(part))
-    except DivergenceError:
-        return np.inf
-    return orbits.orbit_error(np.concatenate(kept)[-(steps - steps // 2) :], target)
 
 
 class _Teacher:
