@@ -73,8 +73,9 @@ def run_corrected(
         for stretch in stretches:
             engine.install()  # somebody may have taken callbacks out meanwhile
             controls, time = _controls(engine, stretch), data.time
+            targets = np.ascontiguousarray(stretch.targets, np.float64)  # one kind is compiled
             with quiet_warnings():
-                steps = advance(machine, learner, controls, stretch.targets, every)
+                steps = advance(machine, learner, controls, targets, every)
             if steps < len(controls):
                 raise _divergence(engine, time + steps * engine.timestep, done + steps)
             done += steps
