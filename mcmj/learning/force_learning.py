@@ -156,10 +156,8 @@ class _Teacher:
     ) -> None:
         self._simulation, self._target, self._learning = simulation, target, learning
         self._rng, self._on_steps = stream(seed, "teacher_noise"), on_steps
-        step, radius = (
-            simulation.in_mujoco.timestep,
-            orbits.rms_radius(target.orbit(orbits.ORBIT_POINTS)),
-        )
+        step = simulation.in_mujoco.timestep
+        radius = orbits.rms_radius(target.orbit(orbits.ORBIT_POINTS))
         self._every = max(1, round(learning.period / step))
         self._hold = max(1, round(learning.noise_hold / step))
         self._noise = learning.noise * radius / np.sqrt(target.n_outputs)
