@@ -50,7 +50,7 @@ MOST_MODULES, MOST_ROOT_ENTRIES = 14, 16
 
 MUJOCO = {
     "core.callbacks.install",
-    "core.callbacks.leapfrog",
+    "core.callbacks.library",
     "core.callbacks.offsets",
     "experiments.benchmark.full_scene",
     "experiments.benchmark.run",
@@ -71,6 +71,7 @@ MUJOCO = {
     "robots.walk_scene",
     "robots.walker",
     "simulation.batch_engine",
+    "simulation.corrected_run",
     "simulation.damage",
     "simulation.interactive",
     "simulation.model_engine",
