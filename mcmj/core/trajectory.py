@@ -1,7 +1,7 @@
 """What a rollout returns, whichever engine ran it."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -67,6 +67,16 @@ class Trajectory:
 
     def __len__(self) -> int:
         return len(self.times)
+
+    def thinned(self, every: int) -> "Trajectory":
+        """The first of every so many samples."""
+        kept = {
+            name: None
+            if (array := getattr(self, name)) is None
+            else np.moveaxis(np.moveaxis(array, axis, 0)[::every], 0, axis).copy()
+            for name, axis in TIME_AXIS.items()
+        }
+        return replace(self, times=self.times[::every], **kept)
 
     @property
     def signals(self) -> Array | None:

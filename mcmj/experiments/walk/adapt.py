@@ -6,7 +6,7 @@ Every ground is walked on from several moments of the stride, by the body that d
 
 import numpy as np
 
-from mcmj.experiments.walk.lesson import Table, WalkLesson, states_at
+from mcmj.experiments.walk.lesson import Table, WalkLesson, walker_at
 from mcmj.robots import walk_metrics
 from mcmj.robots.quadruped import GRAVITY
 from mcmj.robots.walk_metrics import Walk
@@ -28,13 +28,11 @@ def adapt(lesson: WalkLesson, name: str, on_steps: OnSteps = lambda steps: None)
 def _response(lesson: WalkLesson, name: str, coupling: float, on_steps: OnSteps) -> Table:
     config, gait = lesson.config, lesson.gait(name, coupling)
     waits = lesson.period(name) * np.arange(config.starts) / config.starts
-    states = states_at(lesson, gait, waits, coupling)
+    motions = np.array([each.motion for each in walker_at(lesson, gait, waits, coupling)])
 
     def on(terrain: Terrain) -> Table:
         walker = lesson.walker(terrain=terrain, coupling=coupling, copies=config.starts)
-        walker.start(gait)
-        walker.restore(states)
-        walker.stand()
+        walker.start(gait, motions)
         walk = walker.walk(config.before + config.after)
         on_steps(config.starts * round(walk.times[-1] / walker.timestep))
         return _row(lesson, name, walker, walk, terrain.slope)

@@ -1,6 +1,6 @@
 """What all parts of the walking experiment share: the taught body, robots, the table of a walk."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -65,7 +65,10 @@ def learn(config: Config) -> WalkLesson:
 
     def lift(name: str, on_steps: OnSteps) -> tuple[LegReadout, Fit]:
         stride = STRIDES.get(name)
-        return teach_lift(body, readouts[name], gait_target(name), stride=stride, engine="twin")
+        target = gait_target(name)
+        return teach_lift(
+            body, readouts[name], target, stride=stride, pace=config.pace, engine="twin"
+        )
 
     gaits, lifts = _taught(config, lift)
     lesson = WalkLesson(config, body, gaits, fits={"lift_nrmse": lifts})
@@ -110,14 +113,20 @@ def walk_table(lesson: WalkLesson, name: str, walk: Walk) -> Table:
     return {"falls": int(fallen), **measured, "stride_period_s": period}
 
 
-def states_at(lesson: WalkLesson, gait: LegReadout, waits: Array, coupling: float = 0.0) -> Array:
-    """States (len(waits), n) of a robot after `before` seconds and ascending waits [s] more."""
+def walker_at(
+    lesson: WalkLesson, gait: LegReadout, waits: Array, coupling: float = 0.0
+) -> Iterator[Walker]:
+    """A robot after `before` seconds and ascending waits [s] more, one after the other."""
     walker = lesson.walker(coupling=coupling)
     walker.start(gait)
-    states, done = [], 0
     for wait in waits:
         until = round((lesson.config.before + wait) / walker.timestep)
-        walker.advance(until - done)
-        done = until
-        states.append(walker.snapshot()[0])
-    return np.array(states)
+        steps = until - round(walker.time / walker.timestep)
+        if steps > 0:
+            walker.rollout(steps, record=())
+        yield walker
+
+
+def states_at(lesson: WalkLesson, gait: LegReadout, waits: Array, coupling: float = 0.0) -> Array:
+    """Snapshots (len(waits), n) of `walker_at`."""
+    return np.vstack([walker.snapshot() for walker in walker_at(lesson, gait, waits, coupling)])

@@ -11,7 +11,7 @@ from typing import TypeVar
 import numpy as np
 
 from mcmj.experiments.walk.adapt import adapt
-from mcmj.experiments.walk.config import Config
+from mcmj.experiments.walk.config import Config, get_body
 from mcmj.experiments.walk.lesson import Table, WalkLesson, learn, states_at, walk_table
 from mcmj.experiments.walk.recover import recover
 from mcmj.robots import walk_metrics
@@ -93,7 +93,7 @@ def tour(lesson: WalkLesson) -> tuple[Walker, Walk, list[tuple[float, str]]]:
     walker.start(lesson.gaits[order[0]])
     parts, events = [], []
     for index, name in enumerate(order):
-        walker.set_gait(lesson.gaits[name])
+        walker.set_readout(lesson.gaits[name].w_out)
         parts.append(walker.walk(config.before, sample=0.01, joints=True))
         events.append((index * config.before, name))
     return walker, walk_metrics.joined(parts), events
@@ -111,7 +111,7 @@ def switch(
     walker = lesson.walker(copies=config.moments)
     walker.start(lesson.gaits[first])
     walker.restore(states_at(lesson, lesson.gaits[first], moments * lesson.period(first)))
-    walker.set_gait(lesson.gaits[second])
+    walker.set_readout(lesson.gaits[second].w_out)
     walk = walker.walk(config.after, sample=0.02)
     on_steps(round((config.before + config.moments * config.after) / walker.timestep))
     found: list[float] = moments[
@@ -179,9 +179,9 @@ def step_cost(lesson: WalkLesson) -> Table:
     name = lesson.config.gaits[0]
     walker = lesson.walker()
     walker.start(lesson.gaits[name])
-    planar = Simulation(lesson.body, w_out=lesson.gaits[name].swing)
+    planar = Simulation(lesson.body, w_out=get_body(lesson.config)[1][name])
     works = {
-        "scene": lambda: walker.advance(COST_STEPS),
+        "scene": lambda: walker.rollout(COST_STEPS, record=()),
         "planar": lambda: planar.rollout(COST_STEPS, record=()),
     }
     seconds = interleaved_seconds(works, COST_REPEATS)
