@@ -85,8 +85,11 @@ def teach_lift(
     regression.add(run.get("lengths")[::THIN], lifts)
     fit = regression.solve(ridge=RIDGE_PER_ROW * len(lifts))
     stride, state = stride or Stride(), simulation.state
-    both = (rescaled_readout(body, w, size=SIZE) for w in (simulation.readout, fit.w_out))
-    rows = stride.readout(*(Readout.from_rows(w, body.n_springs).rows for w in both))
+    swing, lift = (
+        Readout.from_rows(rescaled_readout(body, w, size=SIZE), body.n_springs).rows
+        for w in (simulation.w_out, fit.w_out)
+    )
+    bias = np.eye(body.n_springs + 1)[:, -1:]
     moved = (state.positions - body.positions)[body.free].ravel()
     start = SIZE * np.stack([moved, pace * state.velocities[body.free].ravel()])
-    return LegReadout(rows, start, stride), fit
+    return LegReadout(stride.commands(swing, lift, bias), start, stride), fit

@@ -50,28 +50,15 @@ class Stride:
         fore, hind = getattr(self, name)
         return np.array([fore if leg.endswith("F") else hind for leg in LEGS])
 
-    def commands(self, positions: Array, lifts: Array) -> Array:
+    def commands(self, positions: Array, lifts: Array, constant: Array | float = 1.0) -> Array:
         """What a gait tells body, hips and legs: x_i, A_i x_i + c_i, B_i z_i (T, COMMANDS).
 
         Args:
-            positions, lifts: x and z, (T, 4).
+            positions, lifts: x and z (T, 4); or their readouts (L + 1, 4), for that of commands.
+            constant: 1; of readouts, its readout (L + 1, 1).
         """
-        return self._scaled(positions, lifts) + self._offset
-
-    def readout(self, positions: Array, lifts: Array) -> Array:
-        """Readout (L + 1, COMMANDS) of the commands from those of x and z (L + 1, 4)."""
-        rows = self._scaled(positions, lifts)
-        rows[-1] += self._offset  # the bias
-        return rows
-
-    def _scaled(self, positions: Array, lifts: Array) -> Array:
-        hips, legs = self.of_legs("swing") * positions, self.of_legs("lift") * lifts
-        return np.hstack([positions, hips, legs])
-
-    @property
-    def _offset(self) -> Array:
-        still = np.zeros(len(LEGS))
-        return np.concatenate([still, self.of_legs("lean"), still])
+        hips = self.of_legs("swing") * positions + self.of_legs("lean") * constant
+        return np.hstack([positions, hips, self.of_legs("lift") * lifts])
 
 
 STRIDES = {  # a bound pitches the trunk, and so needs its hind legs well under it

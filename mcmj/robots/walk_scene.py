@@ -6,7 +6,7 @@ slide horizontally. What the ground does to leg i may enter the body, through th
 
     u_i = g F_i / (M gravity)      F_i = k (b_i - B_i) + d b_i'
 
-where F_i is the force that the servo of leg i bears at length b_i and set point B_i, and M is the
+F_i is the force that the servo of leg i bears at length b_i and set point B_i, and M is the
 robot's mass without load. Input i pushes the nodes that feedback channel i pushes, as strongly.
 All but B_i, which comes from outside, is an actuator with the legs' sensors as its weights, run
 by the compiled callback of callbacks.install.
@@ -47,11 +47,11 @@ class Terrain:
         require_number("load", self.load, 0.0)
 
 
-def walking_model(body: Body, robot: Quadruped, terrain: Terrain, coupling: float) -> mujoco.MjSpec:
+def walking_model(body: Body, robot: Quadruped, terrain: Terrain, bearing: float) -> mujoco.MjSpec:
     """One model of a body and a robot beside it.
 
     Args:
-        coupling: g.
+        bearing: g / (M gravity) [1/N].
 
     Raises:
         InvalidArgumentError: a body without a feedback channel a leg.
@@ -74,18 +74,13 @@ def walking_model(body: Body, robot: Quadruped, terrain: Terrain, coupling: floa
     frame = spec.worldbody.add_frame(pos=above + np.array([0.0, beside, 0.0]), quat=tilt)
     loaded = replace(robot, trunk=robot.trunk + terrain.load)
     spec.attach(mujoco.MjSpec.from_string(quadruped_mjcf(loaded)), prefix=ROBOT, frame=frame)
-    _couple(spec, robot, body.n_springs, coupling)
+    _couple(spec, robot, body.n_springs, bearing)
     return spec
 
 
-def load_per_newton(robot: Quadruped, coupling: float) -> float:
-    """u_i per force F_i [1/N]."""
-    return coupling / (robot.mass * GRAVITY)
-
-
-def _couple(spec: mujoco.MjSpec, robot: Quadruped, n_springs: int, coupling: float) -> None:
+def _couple(spec: mujoco.MjSpec, robot: Quadruped, n_springs: int, bearing: float) -> None:
     """What the legs' sensors, which follow the springs' lengths, bring into the body."""
-    heard = load_per_newton(robot, coupling) * np.array([robot.leg_stiffness, robot.leg_damping])
+    heard = bearing * np.array([robot.leg_stiffness, robot.leg_damping])
     for i in range(len(LEGS)):
         spec.actuator(f"fb{i}").biastype = mujoco.mjtBias.mjBIAS_NONE
         actuator = spec.actuator(f"in{i}")

@@ -14,10 +14,10 @@ from mcmj.core.body import Body
 from mcmj.core.integrators import DEFAULT_INTEGRATOR
 from mcmj.core.trajectory import Trajectory, join
 from mcmj.robots.leg_readouts import LegReadout
-from mcmj.robots.quadruped import Quadruped
+from mcmj.robots.quadruped import GRAVITY, Quadruped
 from mcmj.robots.rescale import SIZE, rescaled
 from mcmj.robots.walk_metrics import Walk
-from mcmj.robots.walk_scene import ROBOT, TRUNK, Terrain, load_per_newton, walking_model
+from mcmj.robots.walk_scene import ROBOT, TRUNK, Terrain, walking_model
 from mcmj.simulation.reservoir import Reservoir
 from mcmj.targets.gaits import LEGS
 from mcmj.utils.validation import MOST_STEPS, Array, require_count, require_number
@@ -56,15 +56,16 @@ class Walker(Reservoir):
         copies: int | None = None,
     ) -> None:
         require_number("coupling", coupling, -np.inf)
-        self.robot, self.pace = robot, pace
+        self.pace = pace
         small = rescaled(body, pace=pace, size=SIZE)
-        bearing = -load_per_newton(robot, coupling) * robot.leg_stiffness
+        bearing = coupling / (robot.mass * GRAVITY)
         channels = {f"x_{leg}": {f"fb{i}": 1.0} for i, leg in enumerate(LEGS)}
         channels |= {f"hip_{leg}": {f"{ROBOT}{leg}_hip": 1.0} for leg in LEGS}
         for i, leg in enumerate(LEGS):
-            channels[f"leg_{leg}"] = {f"{ROBOT}{leg}_leg": 1.0, f"in{i}": bearing}
+            heard = -bearing * robot.leg_stiffness
+            channels[f"leg_{leg}"] = {f"{ROBOT}{leg}_leg": 1.0, f"in{i}": heard}
         super().__init__(
-            walking_model(small, robot, terrain or Terrain(), coupling),
+            walking_model(small, robot, terrain or Terrain(), bearing),
             sensors="length*",
             channels=channels,
             timestep=1e-3 / pace if timestep is None else timestep,
@@ -72,11 +73,6 @@ class Walker(Reservoir):
             copies=copies,
         )
         self._nodes = 2 * len(body.free)  # joints of the body; the trunk's come next
-
-    @property
-    def mass(self) -> float:
-        """Of a robot with its load [kg]."""
-        return float(self.model.body(TRUNK).subtreemass[0])
 
     @property
     def motion(self) -> Array:

@@ -75,9 +75,11 @@ def _each(items: Sequence[K], work: Callable[[K, OnSteps], V], on_steps: OnSteps
     return dict(zip(items, in_threads(work, items, on_steps), strict=True))
 
 
-def walk_gait(lesson: WalkLesson, name: str, on_steps: OnSteps = lambda steps: None) -> Walk:
-    """A walk in one gait, the first `settle` seconds included."""
-    walker = lesson.walker()
+def walk_gait(
+    lesson: WalkLesson, name: str, on_steps: OnSteps = lambda steps: None, **options: float
+) -> Walk:
+    """A walk in one gait, the first `settle` seconds included; options are the robot's."""
+    walker = lesson.walker(**options)
     walker.start(lesson.gaits[name])
     duration = lesson.config.settle + lesson.config.walking
     walk = walker.walk(duration)
@@ -164,14 +166,13 @@ def push_table(config: Config, survived: Mapping[str, Mapping[float, int]]) -> T
 
 def step_study(lesson: WalkLesson, name: str, on_steps: OnSteps = lambda steps: None) -> Table:
     """Statistics of the same walk at other time steps [ms of the body as it was taught]."""
-    table: Table = {}
-    for step in lesson.config.steps_ms:
-        walker = lesson.walker(timestep=step * 1e-3 / lesson.config.pace)
-        walker.start(lesson.gaits[name])
-        walk = walker.walk(lesson.config.settle + lesson.config.walking)
-        on_steps(round(walk.times[-1] / walker.timestep))
-        table[f"{step:g}"] = walk_table(lesson, name, walk)
-    return table
+    pace = lesson.config.pace
+    return {
+        f"{step:g}": walk_table(
+            lesson, name, walk_gait(lesson, name, on_steps, timestep=step * 1e-3 / pace)
+        )
+        for step in lesson.config.steps_ms
+    }
 
 
 def step_cost(lesson: WalkLesson) -> Table:
