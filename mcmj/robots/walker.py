@@ -9,6 +9,7 @@ lengths are the signals; the outputs, of leg i,
 """
 
 import numpy as np
+import numpy.typing as npt
 
 from mcmj.core.body import Body
 from mcmj.core.integrators import DEFAULT_INTEGRATOR
@@ -94,7 +95,12 @@ class Walker(Reservoir):
         self.set_readout(gait.w_out)
 
     def walk(
-        self, duration: float, *, push: object = None, sample: float = 4e-3, joints: bool = False
+        self,
+        duration: float,
+        *,
+        push: npt.ArrayLike | None = None,
+        sample: float = 4e-3,
+        joints: bool = False,
     ) -> Walk:
         """Go on for a while.
 
@@ -116,11 +122,11 @@ class Walker(Reservoir):
         chunk = every * max(1, CHUNK // (every * (self.copies or 1)))
         parts = []
         for samples, impulse in ((pushed, push), (count - pushed, (0.0, 0.0))):
-            if samples > 0:
-                force = np.asarray(impulse, np.float64) / PUSH_DURATION
-                upright = np.zeros((*force.shape[:-1], 1))
+            if impulse is not None and samples > 0:
+                force = np.zeros((*np.shape(impulse)[:-1], 3))
+                force[..., :2] = np.asarray(impulse) / PUSH_DURATION
                 run = self.stream(
-                    samples * every, forces={TRUNK: np.concatenate([force, upright], axis=-1)},
+                    samples * every, forces={TRUNK: force},
                     record=("outputs", "qpos", "sensordata"), chunk=chunk,
                 )  # fmt: skip
                 parts += [part.thinned(every) for part in run]
