@@ -151,8 +151,10 @@ class Course:
         """Lengths (T, L) under the teacher, as the readout sees them."""
         noise = self._rest_noise if lesson.elsewhere else self._noise
         noisy = (1.0 - lesson.own_share) * clean
-        spread = self._teaching.noise * np.asarray(lesson.noise_share)
-        noisy += spread * noise.standard_normal(clean.shape)
+        share = np.broadcast_to(lesson.noise_share, clean.shape[1])
+        loud = share > 0  # only these draw from the stream
+        drawn = noise.standard_normal((len(clean), loud.sum()))
+        noisy[:, loud] += self._teaching.noise * share[loud] * drawn
         run = self.simulation.rollout(
             inputs=None if lesson.inputs is None else lesson.inputs(times),
             offset=noisy,

@@ -3,16 +3,15 @@
 Independent walks run side by side on threads; nothing depends on how many.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import partial
-from typing import TypeVar
 
 import numpy as np
 
 from mcmj.experiments.walk.adapt import adapt
 from mcmj.experiments.walk.config import Config, get_body
-from mcmj.experiments.walk.lesson import Table, WalkLesson, learn, states_at, walk_table
+from mcmj.experiments.walk.lesson import Table, WalkLesson, each, learn, states_at, walk_table
 from mcmj.experiments.walk.recover import recover
 from mcmj.robots import walk_metrics
 from mcmj.robots.walk_metrics import Walk
@@ -20,13 +19,10 @@ from mcmj.robots.walker import Walker
 from mcmj.simulation.simulation import Simulation
 from mcmj.utils.progress import OnSteps
 from mcmj.utils.seeds import stream
-from mcmj.utils.threads import in_threads
 from mcmj.utils.timing import interleaved_seconds, median_ratio
 
 COST_STEPS = 4000
 COST_REPEATS = 7
-K = TypeVar("K")
-V = TypeVar("V")
 
 
 @dataclass(frozen=True)
@@ -50,29 +46,25 @@ def run(config: Config, *, on_steps: OnSteps = lambda steps: None) -> Result:
     walks: dict[str, Walk] = {}
     table: Table = {**lesson.fits}
     if "walk" in config.parts:
-        walks = _each(config.gaits, partial(walk_gait, lesson), on_steps)
+        walks = each(config.gaits, partial(walk_gait, lesson), on_steps)
         table |= {name: walk_table(lesson, name, walk) for name, walk in walks.items()}
     if "switch" in config.parts:
-        falls = _each(config.pairs, partial(switch, lesson), on_steps)
+        falls = each(config.pairs, partial(switch, lesson), on_steps)
         table["switch"] = {
             f"{first}_to_{second}": {"falls": len(at), "of": config.moments, "falls_at": at}
             for (first, second), at in falls.items()
         }
     if "push" in config.parts:
-        table["push"] = push_table(config, _each(config.gaits, partial(push, lesson), on_steps))
+        table["push"] = push_table(config, each(config.gaits, partial(push, lesson), on_steps))
     if "adapt" in config.parts:
-        table["adapt"] = _each(config.gaits, partial(adapt, lesson), on_steps)
+        table["adapt"] = each(config.gaits, partial(adapt, lesson), on_steps)
     if "recover" in config.parts:
-        table["recover"] = _each(config.gaits, partial(recover, lesson), on_steps)
+        table["recover"] = each(config.gaits, partial(recover, lesson), on_steps)
     if "steps" in config.parts:
-        table["steps"] = _each(config.gaits, partial(step_study, lesson), on_steps)
+        table["steps"] = each(config.gaits, partial(step_study, lesson), on_steps)
     if "cost" in config.parts:
         table["cost"] = step_cost(lesson)
     return Result(config, lesson, walks, table)
-
-
-def _each(items: Sequence[K], work: Callable[[K, OnSteps], V], on_steps: OnSteps) -> dict[K, V]:
-    return dict(zip(items, in_threads(work, items, on_steps), strict=True))
 
 
 def walk_gait(
