@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
@@ -70,13 +71,13 @@ class Trajectory:
 
     def thinned(self, every: int) -> "Trajectory":
         """The first of every so many samples."""
-        kept = {
-            name: None
-            if (array := getattr(self, name)) is None
-            else np.moveaxis(np.moveaxis(array, axis, 0)[::every], 0, axis).copy()
+        rows = np.arange(0, len(self), every)
+        kept: dict[str, Any] = {
+            name: np.take(getattr(self, name), rows, axis)
             for name, axis in TIME_AXIS.items()
+            if getattr(self, name) is not None
         }
-        return replace(self, times=self.times[::every], **kept)
+        return replace(self, times=self.times[rows], **kept)
 
     @property
     def signals(self) -> Array | None:
