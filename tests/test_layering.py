@@ -69,7 +69,6 @@ MUJOCO = {
     "pictures.walk_video",
     "robots.trunk_walker",
     "robots.walk_scene",
-    "robots.walker",
     "simulation.batch_engine",
     "simulation.corrected_run",
     "simulation.damage",

@@ -1,7 +1,8 @@
 """What a rollout returns, whichever engine ran it."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
@@ -67,6 +68,16 @@ class Trajectory:
 
     def __len__(self) -> int:
         return len(self.times)
+
+    def thinned(self, every: int) -> "Trajectory":
+        """The first of every so many samples."""
+        rows = np.arange(0, len(self), every)
+        kept: dict[str, Any] = {
+            name: np.take(getattr(self, name), rows, axis)
+            for name, axis in TIME_AXIS.items()
+            if getattr(self, name) is not None
+        }
+        return replace(self, times=self.times[rows], **kept)
 
     @property
     def signals(self) -> Array | None:

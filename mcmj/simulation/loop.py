@@ -179,7 +179,8 @@ class Loop(ABC):
             offset: (T, n_outputs), added to the fed-back outputs; the teacher in teacher forcing.
             gate: (n_outputs,) or a number; default: 1 with a readout, else 0.
             forces: (n_forces,) or (T, n_forces): on the degrees of freedom [N or N m]; of a body
-                along its direction on its nodes [N]; or, of a model, {body: (3,) [N]} constant.
+                along its direction on its nodes [N]; or, of a model, {body: (3,) [N]} constant,
+                (copies, 3) where they differ.
             record: any of "signals", "outputs"; of a model also "qpos", "qvel", "sensordata"
                 (all of its sensors), of a body "positions", "velocities".
             hook: slow (one Python call a control step): function (time, signals (n_signals,)) ->
