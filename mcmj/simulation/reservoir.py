@@ -8,6 +8,7 @@ Inputs, offset, forces and the fed-back outputs are held over the step, also ins
 of RK4.
 """
 
+import copy
 import hashlib
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
@@ -16,6 +17,7 @@ from typing import Any, ClassVar, Self
 
 import mujoco
 import numpy as np
+import numpy.typing as npt
 
 from mcmj.core.readout import Readout, is_pair, readout_rows
 from mcmj.core.rollout_arguments import Drive, check_drive
@@ -91,7 +93,33 @@ class Reservoir(OneDrive):
 
     def _begin(self, engine: Engine, w_out: object, copies: int | None) -> None:
         self._engine, self._copies = engine, copies
+        self._alterations: tuple[tuple[Sequence[Any], Any], ...] = ()
         self.set_readout(w_out)
+
+    def with_copies(self, copies: int, threads: int = 1, *, lenient: bool = False) -> Self:
+        """Independent copies of this reservoir at its start, cuts, masses and readout as they are.
+
+        Args:
+            lenient: copies that blow up are left behind, and `alive` says which; otherwise they
+                are a DivergenceError. What is recorded of them after that means nothing.
+
+        Raises:
+            InvalidArgumentError: it has copies already, an argument out of bounds, or `lenient`
+                with the compiled twin.
+        """
+        if self._copies is not None:
+            raise InvalidArgumentError("reservoir", "one without copies", f"{self._copies}")
+        other = copy.copy(self)
+        other._driven = False
+        other._begin(self._new_engine(copies, threads), self._w_out, copies)
+        if lenient:
+            other._engine.leave_behind()
+        for cut, masses in self._alterations:
+            other.alter(cut=cut, masses=masses)
+        return other
+
+    def _new_engine(self, copies: int, threads: int) -> Engine:
+        return ModelEngine(self._adopted, copies=copies, threads=threads)
 
     @classmethod
     def open(cls, model: Model) -> Self:
@@ -214,6 +242,23 @@ class Reservoir(OneDrive):
         """Back to the start, at time 0."""
         self._engine.reset()
 
+    def restart(self, qpos: object = None, qvel: object = None, act: object = None) -> None:
+        """Time 0 in a state of MuJoCo's own coordinates; None: as at the start.
+
+        Args:
+            qpos, qvel, act: (nq,), (nv,), (na,) for all copies, or (copies, ..) for each.
+
+        Raises:
+            InvalidArgumentError: wrong shape, NaN, or the engine is not MuJoCo.
+        """
+        sizes = {"qpos": self.model.nq, "qvel": self.model.nv, "act": self.model.na}
+        given = {"qpos": qpos, "qvel": qvel, "act": act}
+        self._engine.reset()
+        for name, value in given.items():
+            if value is not None:
+                lead = (self._copies,) if np.ndim(value) == 2 and self._copies is not None else ()
+                self._engine.bound(name)[:] = as_array(name, value, (*lead, sizes[name]))
+
     def set_state(self, qpos: object = None, qvel: object = None) -> None:
         """Put the joints at positions (nq,) and velocities (nv,), MuJoCo's units.
 
@@ -231,6 +276,16 @@ class Reservoir(OneDrive):
     def qvel(self) -> Array:
         """MuJoCo's joint velocities now (nv,)."""
         return self._public(self._engine.bound("qvel").copy())
+
+    @property
+    def act(self) -> Array:
+        """Activations of MuJoCo's actuators now (na,)."""
+        return self._public(self._engine.bound("act").copy())
+
+    @property
+    def alive(self) -> npt.NDArray[np.bool_]:
+        """(copies,): which have not blown up since the start; all, unless `lenient`."""
+        return self._engine.alive.copy()
 
     @property
     def signals(self) -> Array:
@@ -274,6 +329,7 @@ class Reservoir(OneDrive):
         """
         self.check_alteration(cut, masses)
         self._engine.alter(cut, masses)
+        self._alterations += ((cut, masses),)
 
     # --- stepping ----------------------------------------------------------------------------
 
