@@ -44,6 +44,7 @@ ABOVE = {"simulation.trajectory_files", "learning.environments", "analysis.stabi
 MOST_MODULES, MOST_ROOT_ENTRIES = 14, 16
 
 MUJOCO = {
+    "analysis.stability.chart",
     "core.callbacks.install",
     "core.callbacks.leapfrog",
     "core.callbacks.offsets",

@@ -166,6 +166,17 @@ class Reservoir(OneDrive):
         return self._adopted.input_names
 
     @property
+    def late_signals(self) -> tuple[str, ...]:
+        """Names of the signals that are heard as they were one step before."""
+        pairs = zip(self.signal_names, self._adopted.late, strict=True)
+        return tuple(name for name, late in pairs if late)
+
+    @property
+    def feedback_delay(self) -> int:
+        """Steps between a signal and the force it feeds back."""
+        return int(self._adopted.asked["feedback_delay"])
+
+    @property
     def n_signals(self) -> int:
         """Number of signals that the readout hears."""
         return len(self.signal_names)
@@ -256,7 +267,8 @@ class Reservoir(OneDrive):
         self._engine.reset()
         for name, value in given.items():
             if value is not None:
-                lead = (self._copies,) if np.ndim(value) == 2 and self._copies is not None else ()
+                each = self._copies is not None and np.asarray(value).ndim == 2
+                lead = (self._copies,) if each else ()
                 self._engine.bound(name)[:] = as_array(name, value, (*lead, sizes[name]))
 
     def set_state(self, qpos: object = None, qvel: object = None) -> None:

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from mcmj.analysis.stability.cycle import Cycle
 from mcmj.analysis.stability.closed_loops import Loop
+from mcmj.analysis.stability.cycle import Cycle
 from mcmj.metrics import orbits
 from mcmj.targets.limit_cycles import Target
 from mcmj.utils.validation import Array, require_number
@@ -132,9 +132,7 @@ def on_cycle(loop: Loop, cycle: Cycle, count: int) -> Array:
     return loop.trail(cycle.state, stride, count)
 
 
-def kicked(
-    loop: Loop, cycle: Cycle, strengths: Array, generator: np.random.Generator
-) -> Array:
+def kicked(loop: Loop, cycle: Cycle, strengths: Array, generator: np.random.Generator) -> Array:
     """States (B, n) of the cycle, with velocity kicks in random directions.
 
     Args:

@@ -56,8 +56,8 @@ class Chart:
     def coordinates(self, qpos: Array, qvel: Array, act: Array) -> Array:
         """z (B, size) of states (B, nq), (B, nv), (B, na)."""
         dq, v = np.empty_like(qvel), qvel.copy()
-        q, dof = self._plain
-        dq[:, dof] = qpos[:, q] - self.reference[q]
+        places, dofs = self._plain
+        dq[:, dofs] = qpos[:, places] - self.reference[places]
         for q, dof in self._ball:
             back = rotations.inverse(self.reference[q : q + 4])
             turn = rotations.product(back, qpos[:, q : q + 4])
@@ -73,8 +73,8 @@ class Chart:
         """qpos (B, nq), qvel (B, nv) and act (B, na) at z (B, size)."""
         dq, v, act = np.split(z, [self.nv, 2 * self.nv], axis=1)
         qpos, qvel = np.tile(self.reference, (len(z), 1)), v.copy()
-        q, dof = self._plain
-        qpos[:, q] += dq[:, dof]
+        places, dofs = self._plain
+        qpos[:, places] += dq[:, dofs]
         for q, dof in self._ball:
             turn = rotations.from_vector(dq[:, dof : dof + 3])
             qpos[:, q : q + 4] = rotations.product(self.reference[q : q + 4], turn)

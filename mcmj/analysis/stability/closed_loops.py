@@ -2,8 +2,8 @@
 
     z_{k+1} = Phi(z_k, u_k)        z (n,), for copies (B, n)
 
-Two kinds: `loop.ClosedLoop`, a planar body in the compiled twin, and `reservoir_loop.ReservoirLoop`,
-any reservoir in MuJoCo.
+Two kinds: `loop.ClosedLoop`, a planar body in the compiled twin, and
+`reservoir_loop.ReservoirLoop`, any reservoir in MuJoCo.
 """
 
 from dataclasses import dataclass

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import cKDTree
 
-from mcmj.analysis.stability.cycle import Cycle
 from mcmj.analysis.stability.closed_loops import Loop
+from mcmj.analysis.stability.cycle import Cycle
 from mcmj.utils.errors import InvalidArgumentError
 from mcmj.utils.seeds import stream
 from mcmj.utils.validation import Array, require_count, require_number

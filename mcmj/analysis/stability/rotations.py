@@ -12,12 +12,14 @@ def product(a: Array, b: Array) -> Array:
     """a b, (.., 4)."""
     wa, va, wb, vb = a[..., :1], a[..., 1:], b[..., :1], b[..., 1:]
     w = wa * wb - (va * vb).sum(axis=-1, keepdims=True)
-    return np.concatenate([w, wa * vb + wb * va + np.cross(va, vb)], axis=-1)
+    found: Array = np.concatenate([w, wa * vb + wb * va + np.cross(va, vb)], axis=-1)
+    return found
 
 
 def inverse(q: Array) -> Array:
     """q* (.., 4)."""
-    return q * np.array([1.0, -1.0, -1.0, -1.0])
+    found: Array = q * np.array([1.0, -1.0, -1.0, -1.0])
+    return found
 
 
 def turned(q: Array, v: Array) -> Array:

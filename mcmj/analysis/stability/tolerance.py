@@ -151,8 +151,6 @@ def noise_tolerance(
     return largest_tolerated(recovers, len(states), *NOISES, ratio=trial.ratio)
 
 
-def _recovered(
-    loop: Loop, target: Target, states: Array, trial: Trial
-) -> npt.NDArray[np.bool_]:
+def _recovered(loop: Loop, target: Target, states: Array, trial: Trial) -> npt.NDArray[np.bool_]:
     found = survey(loop, target, states, duration=trial.recovery, threshold=trial.threshold)
     return found.recovered

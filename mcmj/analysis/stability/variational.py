@@ -24,9 +24,16 @@ _ONE = np.eye(2)
 
 
 class StepMap:
-    """z -> Phi(z) and the parts of DPhi(z), for one state (n,)."""
+    """z -> Phi(z) and the parts of DPhi(z), for one state (n,) of a planar body.
+
+    Raises:
+        InvalidArgumentError: another kind of loop.
+    """
 
     def __init__(self, loop: ClosedLoop) -> None:
+        if not isinstance(loop, ClosedLoop):
+            wanted = "a ClosedLoop: planar bodies only are linearised exactly; `multipliers_of`"
+            raise InvalidArgumentError("loop", f"{wanted} takes any loop", type(loop).__name__)
         body = loop.body
         self._body, self._step = body, loop.timestep
         free = body.free
