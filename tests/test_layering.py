@@ -35,6 +35,7 @@ RANKS = (
 )
 # a folder within a package, and the side of the other modules of the package that it is on
 BELOW = {
+    "analysis.loops",
     "core.callbacks",
     "reference.twin",
     "simulation.stepsize",
@@ -44,7 +45,7 @@ ABOVE = {"simulation.trajectory_files", "learning.environments", "analysis.stabi
 MOST_MODULES, MOST_ROOT_ENTRIES = 14, 16
 
 MUJOCO = {
-    "analysis.stability.chart",
+    "analysis.loops.chart",
     "core.callbacks.install",
     "core.callbacks.leapfrog",
     "core.callbacks.offsets",

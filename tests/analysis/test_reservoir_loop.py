@@ -8,8 +8,9 @@ import pytest
 from scipy.linalg import expm
 
 import mcmj
+from mcmj.analysis.loops.chart import Chart
+from mcmj.analysis.loops.reservoir_loop import ReservoirLoop
 from mcmj.analysis.stability.basin import kicked, on_cycle, pushed, survey
-from mcmj.analysis.stability.chart import Chart
 from mcmj.analysis.stability.cycle import Cycle, find_cycle
 from mcmj.analysis.stability.floquet import (
     differences,
@@ -19,7 +20,6 @@ from mcmj.analysis.stability.floquet import (
 )
 from mcmj.analysis.stability.loop import ClosedLoop
 from mcmj.analysis.stability.lyapunov import lyapunov_exponent
-from mcmj.analysis.stability.reservoir_loop import ReservoirLoop
 from mcmj.analysis.stability.variational import variational
 from mcmj.metrics.orbits import orbit_error
 from mcmj.targets.limit_cycles import limit_cycle

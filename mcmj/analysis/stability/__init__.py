@@ -2,5 +2,5 @@
 
 Of a planar body many copies run in the compiled twin of MuJoCo's Euler (`loop.ClosedLoop`);
 samples are repeated in MuJoCo itself (`confirm`). Of any other reservoir they run in MuJoCo
-(`reservoir_loop.ReservoirLoop`), by finite differences only.
+(`mcmj.analysis.loops`), by finite differences only.
 """

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from mcmj.analysis.stability.closed_loops import Loop
+from mcmj.analysis.loops.closed_loops import Loop
 from mcmj.analysis.stability.cycle import Cycle
 from mcmj.metrics import orbits
 from mcmj.targets.limit_cycles import Target

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import brentq
 
-from mcmj.analysis.stability.closed_loops import Loop
+from mcmj.analysis.loops.closed_loops import Loop
 from mcmj.metrics import orbits
 from mcmj.utils.errors import McmjError
 from mcmj.utils.validation import Array, require_number

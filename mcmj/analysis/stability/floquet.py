@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.integrate import solve_ivp
 
-from mcmj.analysis.stability.closed_loops import Loop
+from mcmj.analysis.loops.closed_loops import Loop
 from mcmj.analysis.stability.cycle import Cycle, flow_map
 from mcmj.analysis.stability.loop import ClosedLoop
 from mcmj.analysis.stability.variational import variational

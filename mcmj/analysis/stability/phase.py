@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import cKDTree
 
-from mcmj.analysis.stability.closed_loops import Loop
+from mcmj.analysis.loops.closed_loops import Loop
 from mcmj.analysis.stability.cycle import Cycle
 from mcmj.utils.errors import InvalidArgumentError
 from mcmj.utils.seeds import stream

@@ -7,8 +7,8 @@ import numpy as np
 import numpy.typing as npt
 from scipy.stats import binom
 
+from mcmj.analysis.loops.closed_loops import Loop
 from mcmj.analysis.stability.basin import pushed, survey
-from mcmj.analysis.stability.closed_loops import Loop
 from mcmj.analysis.stability.phase import fed_back_noise
 from mcmj.targets.limit_cycles import Target
 from mcmj.utils.seeds import stream

@@ -11,9 +11,9 @@ from typing import Any, Self
 
 import numpy as np
 
-from mcmj.analysis.stability.closed_loops import LoopRun, advanced
-from mcmj.analysis.stability.placed_copies import PlacedCopies
-from mcmj.analysis.stability.symmetries import cyclic_coordinates
+from mcmj.analysis.loops.closed_loops import LoopRun, advanced
+from mcmj.analysis.loops.placed_copies import PlacedCopies
+from mcmj.analysis.loops.symmetries import cyclic_coordinates
 from mcmj.core.readout import Readout
 from mcmj.simulation.reservoir import CHUNK, Reservoir
 from mcmj.utils.errors import InvalidArgumentError, UnknownNameError

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from mcmj.analysis.stability.chart import Chart
+from mcmj.analysis.loops.chart import Chart
 from mcmj.core.integrators import integrator_named
 from mcmj.simulation.reservoir import Reservoir
 from mcmj.simulation.simulation import Simulation

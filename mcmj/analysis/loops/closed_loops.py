@@ -2,7 +2,7 @@
 
     z_{k+1} = Phi(z_k, u_k)        z (n,), for copies (B, n)
 
-Two kinds: `loop.ClosedLoop`, a planar body in the compiled twin, and
+Two kinds: `stability.loop.ClosedLoop`, a planar body in the compiled twin, and
 `reservoir_loop.ReservoirLoop`, any reservoir in MuJoCo.
 """
 

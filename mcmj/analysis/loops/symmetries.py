@@ -7,7 +7,7 @@ comes back only without them.
 
 import numpy as np
 
-from mcmj.analysis.stability.placed_copies import PlacedCopies
+from mcmj.analysis.loops.placed_copies import PlacedCopies
 from mcmj.simulation.reservoir import CHUNK
 from mcmj.utils.seeds import stream
 from mcmj.utils.validation import Array

@@ -15,7 +15,7 @@ import mujoco
 import numpy as np
 import numpy.typing as npt
 
-from mcmj.analysis.stability import rotations
+from mcmj.analysis.loops import rotations
 from mcmj.utils.validation import Array
 
 _FREE, _BALL = mujoco.mjtJoint.mjJNT_FREE.value, mujoco.mjtJoint.mjJNT_BALL.value
