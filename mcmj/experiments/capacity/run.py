@@ -1,9 +1,9 @@
 """What a body is worth: memory and processing capacity, kernel and generalisation rank.
 
 Symbols, independent and uniform in [-1, 1], push the body for `hold` seconds each; its state is
-its lengths at the end of each (`mcmj.analysis.capacities`, which takes any reservoir). One body
-in MuJoCo; then maps over stiffness and damping, and
-over size and input strength, by the compiled twin (same bits but for rounding, faster).
+its lengths at the end of each (`mcmj.analysis.capacities`, which takes any reservoir). One body in
+MuJoCo; then maps over stiffness and damping, and over size and input strength, by the compiled
+twin (same bits but for rounding, faster).
 """
 
 from dataclasses import replace
