@@ -35,7 +35,7 @@ class Probe:
 
     Attributes:
         seed: of the symbols.
-        symbols: number of them.
+        symbols: number of symbols.
         washout: symbols left out at the start.
         hold: how long a symbol is shown [s].
         strength: value of the input per unit symbol; of a body, force on top of the input weights.
