@@ -341,7 +341,7 @@ class Reservoir(OneDrive):
         """
         self.check_alteration(cut, masses)
         self._engine.alter(cut, masses)
-        self._alterations += ((cut, masses),)
+        self._alterations += ((tuple(cut), masses),)
 
     # --- stepping ----------------------------------------------------------------------------
 

@@ -11,6 +11,7 @@ import mcmj
 from mcmj.analysis.loops.chart import Chart
 from mcmj.analysis.loops.reservoir_loop import ReservoirLoop
 from mcmj.analysis.stability.basin import kicked, on_cycle, pushed, survey
+from mcmj.analysis.stability.confirm import directional
 from mcmj.analysis.stability.cycle import Cycle, find_cycle
 from mcmj.analysis.stability.floquet import (
     differences,
@@ -20,6 +21,8 @@ from mcmj.analysis.stability.floquet import (
 )
 from mcmj.analysis.stability.loop import ClosedLoop
 from mcmj.analysis.stability.lyapunov import lyapunov_exponent
+from mcmj.analysis.stability.phase import phase_diffusion
+from mcmj.analysis.stability.tolerance import Trial, force_tolerance
 from mcmj.analysis.stability.variational import variational
 from mcmj.metrics.orbits import orbit_error
 from mcmj.targets.limit_cycles import limit_cycle
@@ -36,6 +39,12 @@ viscosity="1e-3"/><default><geom type="ellipsoid" density="1000"/></default><wor
  <geom size=".1 .02 .05"/>
   <body pos=".2 0 0"><joint name="b" axis="0 .3 1" pos="-.1 0 0" stiffness=".15" damping=".02"/>
   <geom size=".1 .01 .05"/></body></body></body></worldbody>
+<actuator><motor name="m" joint="a"/></actuator></mujoco>"""
+BOX = """<mujoco><option timestep="1e-3" cone="elliptic" iterations="100" tolerance="1e-12"/>
+<worldbody><geom type="plane" size="5 5 .1"/><body pos="{pos}" quat="{quat}">
+<freejoint name="root"/><geom type="box" size=".2 .15 .1" density="200"/><body pos="0 0 .2">
+<joint name="a" type="slide" axis=".3 0 1" stiffness="20" damping="0 0 .4"/>
+<geom size=".05" mass=".3" contype="0" conaffinity="0"/></body></body></worldbody>
 <actuator><motor name="m" joint="a"/></actuator></mujoco>"""
 JOINTS = """<mujoco><worldbody>
 <body quat=".8 .1 -.3 .5"><freejoint name="f"/><geom size=".1"/>
@@ -174,6 +183,19 @@ def test_a_survey_agrees_with_separate_rollouts(rayleigh):
     assert np.isfinite(pushed(loop, states[:3], np.full((3, 1), 0.1), 0.5)).all()
 
 
+def test_noise_and_forces_are_tolerated_as_of_a_body(rayleigh):
+    """Jitter is of first order in the noise; a kick of the cycle's own speed is recovered from."""
+    _, loop, cycle = rayleigh
+    one, twice = (phase_diffusion(loop, cycle, s, copies=8).jitter for s in (1e-4, 2e-4))
+    assert twice == pytest.approx(2 * one, rel=1e-2)
+    goal = limit_cycle(
+        "rayleigh", lambda t, x: np.array([x[1], x[1] - x[1] ** 3 / 3 - x[0]]), [1.0, 0.0]
+    )
+    trial = Trial(hold=1.0, recovery=25.0, ratio=1e3)
+    found = force_tolerance(loop, goal, on_cycle(loop, cycle, 2), trial)
+    assert (found.values >= 1.0).all()
+
+
 # --- symmetries ------------------------------------------------------------------------------
 
 
@@ -203,6 +225,26 @@ def test_a_swimmer_elsewhere_and_turned_has_the_same_multipliers():
     np.testing.assert_allclose(other.multipliers, one.multipliers, atol=1e-8)
     assert one.neutral == 1
     assert one.leading_nontrivial < 0.95
+
+
+def test_on_the_ground_place_and_heading_are_left_out_and_height_and_tilt_are_not():
+    """A box with an oscillating mass, standing still, and one elsewhere and turned."""
+    found = []
+    for pos, quat in (("0 0 .1", "1 0 0 0"), ("1 2 .1", ".9 0 0 .4")):
+        reservoir = mcmj.Reservoir(
+            BOX.format(pos=pos, quat=quat), sensors=["jointpos:*", "jointvel:*"], channels=["m"],
+            w_out=[[0.0], [0.5]],
+        )  # fmt: skip
+        reservoir.rollout(40_000, record=())
+        loop = ReservoirLoop(reservoir)
+        assert loop.left_out == ("root:x", "root:y", "root:yaw")
+        cycle = find_cycle(loop, loop.now, 0.77, settle=20.0)
+        found.append(multipliers_of(loop, cycle))
+    one, other = (each.multipliers[:2] for each in found)
+    np.testing.assert_allclose(other, one, atol=1e-8)
+    assert abs(one[0] - 1) < 1e-8
+    assert abs(one[1]) < 0.5
+    assert abs(found[0].multipliers[2]) < 1e-6  # what the contact holds
 
 
 def test_what_is_left_out_can_be_said():
@@ -273,5 +315,7 @@ def test_what_is_for_planar_bodies_says_so(rayleigh):
     _, loop, cycle = rayleigh
     with pytest.raises(InvalidArgumentError, match="planar bodies only"):
         floquet(loop, cycle)
+    with pytest.raises(InvalidArgumentError, match="planar bodies only"):
+        directional(loop, cycle.state, np.eye(2), cycle.period, 1e-4)
     with pytest.raises(InvalidArgumentError, match="refine"):
         pushed(loop, cycle.state[None], None, 1.0, refine=5)

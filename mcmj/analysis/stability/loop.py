@@ -16,6 +16,7 @@ from mcmj.core.readout import Readout, checked_readout
 from mcmj.core.rollout_arguments import check_drive
 from mcmj.core.trajectory import State
 from mcmj.reference.twin.population import Population
+from mcmj.utils.errors import InvalidArgumentError
 from mcmj.utils.validation import Array, as_array, require_count, require_number
 
 METHOD = "semi_implicit_euler"
@@ -163,3 +164,17 @@ class ClosedLoop:
         now, free = population.kernel_state, self.body.free
         moving = np.stack([now.positions[:, free], now.velocities[:, free]], axis=1)
         return moving.reshape(len(moving), -1)
+
+
+def require_planar(loop: object, what: str) -> None:
+    """Raise unless a loop is that of a planar body.
+
+    Args:
+        what: only these can do.
+
+    Raises:
+        InvalidArgumentError: it is another kind of loop.
+    """
+    if not isinstance(loop, ClosedLoop):
+        wanted = f"a ClosedLoop: planar bodies only {what}"
+        raise InvalidArgumentError("loop", wanted, type(loop).__name__)

@@ -16,7 +16,7 @@ and A has w_fb (W_out^T dl/dp) in its x rows. All terms are kept, turning spring
 import numpy as np
 
 from mcmj.analysis.stability.cycle import weights_at
-from mcmj.analysis.stability.loop import ClosedLoop
+from mcmj.analysis.stability.loop import ClosedLoop, require_planar
 from mcmj.utils.errors import InvalidArgumentError
 from mcmj.utils.validation import Array
 
@@ -31,9 +31,7 @@ class StepMap:
     """
 
     def __init__(self, loop: ClosedLoop) -> None:
-        if not isinstance(loop, ClosedLoop):
-            wanted = "a ClosedLoop: planar bodies only are linearised exactly; `multipliers_of`"
-            raise InvalidArgumentError("loop", f"{wanted} takes any loop", type(loop).__name__)
+        require_planar(loop, "are linearised exactly; `multipliers_of` takes any loop")
         body = loop.body
         self._body, self._step = body, loop.timestep
         free = body.free
