@@ -72,9 +72,7 @@ class BatchEngine:
         if threads > 1:
             guard_against_forks(self)
         self._views: dict[str, Array] = {}
-        self.alive = np.ones(
-            copies, np.bool_
-        )  # which have not blown up since the start, or `restore`
+        self.alive = np.ones(copies, np.bool_)  # not blown up since the start, or `restore`
         self.steps_done = 0
         self.reset()
 

@@ -263,13 +263,15 @@ class Reservoir(OneDrive):
             InvalidArgumentError: wrong shape, NaN, or the engine is not MuJoCo.
         """
         sizes = {"qpos": self.model.nq, "qvel": self.model.nv, "act": self.model.na}
-        given = {"qpos": qpos, "qvel": qvel, "act": act}
-        self._engine.reset()
-        for name, value in given.items():
+        arrays = {}
+        for name, value in (("qpos", qpos), ("qvel", qvel), ("act", act)):
             if value is not None:
                 each = self._copies is not None and np.asarray(value).ndim == 2
                 lead = (self._copies,) if each else ()
-                self._engine.bound(name)[:] = as_array(name, value, (*lead, sizes[name]))
+                arrays[name] = as_array(name, value, (*lead, sizes[name]))
+        self._engine.reset()
+        for name, array in arrays.items():
+            self._engine.bound(name)[:] = array
 
     def set_state(self, qpos: object = None, qvel: object = None) -> None:
         """Put the joints at positions (nq,) and velocities (nv,), MuJoCo's units.
@@ -341,7 +343,7 @@ class Reservoir(OneDrive):
         """
         self.check_alteration(cut, masses)
         self._engine.alter(cut, masses)
-        self._alterations += ((tuple(cut), masses),)
+        self._alterations += ((tuple(cut), copy.copy(masses)),)
 
     # --- stepping ----------------------------------------------------------------------------
 

@@ -159,7 +159,7 @@ class Simulation(Reservoir):
         self.check_alteration(cut, masses)
         weights = None if masses is None else checked_masses(self.body, masses)
         self._engine.alter(checked_cut(self.body, cut), weights)
-        self._alterations += ((tuple(cut), masses),)
+        self._alterations += ((tuple(cut), weights),)
 
     @property
     def state(self) -> State:

@@ -279,7 +279,7 @@ def test_a_planar_body_moves_in_mujoco_as_in_the_twin(body, w_bias):
 def test_a_taught_body_has_the_multipliers_of_its_twin(taught_loop):
     twin, cycle, _ = taught_loop
     simulation = mcmj.Simulation(twin.body, w_out=twin.w_out)
-    loop = ReservoirLoop(simulation)
+    loop = ReservoirLoop(simulation, threads=2)
     moved = replace(cycle, state=cycle.state - twin.rest)
     wanted, found = floquet(twin, cycle), multipliers_of(loop, moved)
     np.testing.assert_allclose(found.multipliers[:6], wanted.multipliers[:6], atol=1e-6)
