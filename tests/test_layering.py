@@ -35,6 +35,7 @@ RANKS = (
 )
 # a folder within a package, and the side of the other modules of the package that it is on
 BELOW = {
+    "analysis.loops",
     "core.callbacks",
     "reference.twin",
     "simulation.stepsize",
@@ -49,6 +50,7 @@ ABOVE = {
 MOST_MODULES, MOST_ROOT_ENTRIES = 14, 16
 
 MUJOCO = {
+    "analysis.loops.chart",
     "core.callbacks.install",
     "core.callbacks.library",
     "core.callbacks.offsets",

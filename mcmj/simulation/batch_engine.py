@@ -55,6 +55,7 @@ class BatchEngine:
     """
 
     advice = "try a smaller step, another integrator, or smaller outputs"
+    _lenient = False  # copies that blow up are no errors
     _passive = False  # whether mcmj's callback makes passive forces
     _stage = POSITION_STAGE  # up to which sensors are of use
 
@@ -76,6 +77,7 @@ class BatchEngine:
         if threads > 1:
             guard_against_forks(self)
         self._views: dict[str, Array] = {}
+        self.alive = np.ones(copies, np.bool_)  # not blown up since the start, or `restore`
         self.steps_done = 0
         self.reset()
 
@@ -90,9 +92,14 @@ class BatchEngine:
             self._views[name] = self.batch.bind(name)
         return self._views[name]
 
+    def leave_behind(self) -> None:
+        """From now on, copies that blow up are no errors; `alive` says which."""
+        self._lenient = True
+
     def reset(self) -> None:
         """All copies back to the start, time 0."""
         self.batch.reset(stage=_NO_STAGE)
+        self.alive[:] = True
         self.steps_done = 0
 
     def set_readout(self, w_out: Array | None) -> None:
@@ -118,6 +125,7 @@ class BatchEngine:
         if snapshot.shape != shape:
             raise InvalidArgumentError("snapshot", f"shape {shape}", f"shape {snapshot.shape}")
         self.batch.state[:] = snapshot[:, :-1]
+        self.alive[:] = True
         self.steps_done = int(snapshot[0, -1])
 
     def sensors_now(self) -> Array:
@@ -178,12 +186,13 @@ class BatchEngine:
         return np.repeat(control, self.substeps, axis=-2), spec
 
     def _check_alive(self, time_before: Array, steps: int) -> None:
-        """Raise if a copy stopped early or holds a number that is not finite."""
+        """Raise, or note, that a copy stopped early or holds a number that is not finite."""
         time, step = self.bound("time"), self.timestep / self.substeps
         done = np.rint((time - time_before) / step).astype(int)
         finite = np.isfinite(self.bound("qvel")).all(axis=1)
         dead = np.flatnonzero((done < steps) | ~finite)
-        if not dead.size:
+        self.alive[dead] = False
+        if not dead.size or self._lenient:
             return
         copy = dead[0]
         self.steps_done += int(done[copy]) // self.substeps

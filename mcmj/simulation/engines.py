@@ -2,6 +2,9 @@
 
 from typing import Any, Protocol
 
+import numpy as np
+import numpy.typing as npt
+
 from mcmj.core.body import Body
 from mcmj.core.options import Options
 from mcmj.core.rollout_arguments import Drive
@@ -27,6 +30,13 @@ class Engine(Protocol):
     @property
     def steps_done(self) -> int:
         """Control steps since the start."""
+
+    @property
+    def alive(self) -> npt.NDArray[np.bool_]:
+        """(copies,) which have not blown up since the start."""
+
+    def leave_behind(self) -> None:
+        """From now on, copies that blow up are no errors; `alive` says which."""
 
     def reset(self) -> None:
         """Back to the start."""

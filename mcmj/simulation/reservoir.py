@@ -8,14 +8,17 @@ Inputs, offset, forces and the fed-back outputs are held over the step, also ins
 of RK4.
 """
 
+import copy
 from collections.abc import Sequence
 from typing import Any, Self
 
 import mujoco
 import numpy as np
+import numpy.typing as npt
 
 from mcmj.simulation.batch_engine import BatchEngine
 from mcmj.simulation.damage import check_model_damage
+from mcmj.simulation.engines import Engine
 from mcmj.simulation.loop import CHUNK as CHUNK
 from mcmj.simulation.loop import Loop
 from mcmj.simulation.model_engine import ModelEngine
@@ -23,7 +26,7 @@ from mcmj.simulation.models.adopt import Model, adopt, read_spec
 from mcmj.simulation.models.names import Channels
 from mcmj.simulation.models.reservoir_file import read_reservoir, write_reservoir
 from mcmj.utils.errors import InvalidArgumentError
-from mcmj.utils.validation import Array
+from mcmj.utils.validation import Array, as_array
 
 
 class Reservoir(Loop):
@@ -76,6 +79,35 @@ class Reservoir(Loop):
         engine = ModelEngine(self._adopted, copies=1 if copies is None else copies, threads=threads)
         self._begin(engine, w_out, copies)
 
+    def _begin(self, engine: Engine, w_out: object, copies: int | None) -> None:
+        self._alterations: tuple[tuple[Sequence[Any], Any], ...] = ()
+        super()._begin(engine, w_out, copies)
+
+    def with_copies(self, copies: int, threads: int = 1, *, lenient: bool = False) -> Self:
+        """Independent copies of this reservoir at its start, cuts, masses and readout as they are.
+
+        Args:
+            lenient: copies that blow up are left behind, and `alive` says which; otherwise they
+                are a DivergenceError. What is recorded of them after that means nothing.
+
+        Raises:
+            InvalidArgumentError: it has copies already, an argument out of bounds, or `lenient`
+                with the compiled twin.
+        """
+        if self._copies is not None:
+            raise InvalidArgumentError("reservoir", "one without copies", f"{self._copies}")
+        other = copy.copy(self)
+        other._driven = False
+        other._begin(self._new_engine(copies, threads), self._w_out, copies)
+        if lenient:
+            other._engine.leave_behind()
+        for cut, masses in self._alterations:
+            other.alter(cut=cut, masses=masses)
+        return other
+
+    def _new_engine(self, copies: int, threads: int) -> Engine:
+        return ModelEngine(self._adopted, copies=copies, threads=threads)
+
     @classmethod
     def open(cls, model: Model) -> Self:
         """A reservoir from its file, with its readout; see `to_mjcf`.
@@ -121,6 +153,17 @@ class Reservoir(Loop):
         return self._adopted.input_names
 
     @property
+    def late_signals(self) -> tuple[str, ...]:
+        """Names of the signals that are heard as they were one step before."""
+        pairs = zip(self.signal_names, self._adopted.late, strict=True)
+        return tuple(name for name, late in pairs if late)
+
+    @property
+    def feedback_delay(self) -> int:
+        """Steps between a signal and the force it feeds back."""
+        return int(self._adopted.asked["feedback_delay"])
+
+    @property
     def n_forces(self) -> int:
         """Number of forces: degrees of freedom."""
         return int(self.model.nv)
@@ -140,6 +183,26 @@ class Reservoir(Loop):
 
     # --- state -------------------------------------------------------------------------------
 
+    def restart(self, qpos: object = None, qvel: object = None, act: object = None) -> None:
+        """Time 0 in a state of MuJoCo's own coordinates; None: as at the start.
+
+        Args:
+            qpos, qvel, act: (nq,), (nv,), (na,) for all copies, or (copies, ..) for each.
+
+        Raises:
+            InvalidArgumentError: wrong shape, NaN, or the engine is not MuJoCo.
+        """
+        sizes = {"qpos": self.model.nq, "qvel": self.model.nv, "act": self.model.na}
+        arrays = {}
+        for name, value in (("qpos", qpos), ("qvel", qvel), ("act", act)):
+            if value is not None:
+                each = self._copies is not None and np.asarray(value).ndim == 2
+                lead = (self._copies,) if each else ()
+                arrays[name] = as_array(name, value, (*lead, sizes[name]))
+        self._engine.reset()
+        for name, array in arrays.items():
+            self._engine.bound(name)[:] = array
+
     def set_state(self, qpos: object = None, qvel: object = None) -> None:
         """Put the joints at positions (nq,) and velocities (nv,), MuJoCo's units.
 
@@ -158,6 +221,16 @@ class Reservoir(Loop):
         """MuJoCo's joint velocities now (nv,)."""
         return self._public(self._engine.bound("qvel").copy())
 
+    @property
+    def act(self) -> Array:
+        """Activations of MuJoCo's actuators now (na,)."""
+        return self._public(self._engine.bound("act").copy())
+
+    @property
+    def alive(self) -> npt.NDArray[np.bool_]:
+        """(copies,): which have not blown up since the start; all, unless `lenient`."""
+        return self._engine.alive.copy()
+
     def check_alteration(self, cut: Sequence[Any], masses: Any) -> None:
         """Raise unless `alter` can do this.
 
@@ -174,6 +247,7 @@ class Reservoir(Loop):
         """
         self.check_alteration(cut, masses)
         self._engine.alter(cut, masses)
+        self._alterations += ((tuple(cut), copy.copy(masses)),)
 
     # --- inside ------------------------------------------------------------------------------
 

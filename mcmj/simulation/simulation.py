@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import fields, replace
-from typing import ClassVar
+from typing import ClassVar, cast
 
 from mcmj.core.body import Body
 from mcmj.core.callbacks.spring_laws import SpringLaw
@@ -10,6 +10,7 @@ from mcmj.core.integrators import DEFAULT_INTEGRATOR
 from mcmj.core.options import Options
 from mcmj.core.trajectory import State
 from mcmj.mjcf.write import to_mjcf
+from mcmj.reference.twin.engine import TwinEngine
 from mcmj.simulation.body_engine import BodyEngine
 from mcmj.simulation.damage import checked_cut, checked_masses
 from mcmj.simulation.engines import make_engine
@@ -74,8 +75,19 @@ class Simulation(Reservoir):
             body, options, copies=1 if copies is None else copies, threads=threads
         )
         warn_if_unstable(body, options)
-        self._body_engine = one_engine
         self._begin(one_engine, w_out, copies)
+
+    def _new_engine(self, copies: int, threads: int) -> BodyEngine | TwinEngine:
+        return make_engine(self.body, self.options, copies=copies, threads=threads)
+
+    @property
+    def _body_engine(self) -> BodyEngine | TwinEngine:
+        return cast(BodyEngine | TwinEngine, self._engine)
+
+    @property
+    def options(self) -> Options:
+        """How it is stepped: time step, integrator, springs, delay, substeps, engine."""
+        return self._body_engine.options
 
     @property
     def body(self) -> Body:
@@ -98,6 +110,16 @@ class Simulation(Reservoir):
         return tuple(f"in{c}" for c in range(self.body.n_inputs))
 
     @property
+    def late_signals(self) -> tuple[str, ...]:
+        """None: lengths are those of the moment."""
+        return ()
+
+    @property
+    def feedback_delay(self) -> int:
+        """Steps between a length and the force it feeds back."""
+        return self.options.feedback_delay
+
+    @property
     def n_signals(self) -> int:
         """L."""
         return self.body.n_springs
@@ -109,11 +131,10 @@ class Simulation(Reservoir):
 
     def to_mjcf(self) -> str:
         """The body as MJCF with its readout, to the last bit; see mcmj.to_mjcf."""
-        options = self._body_engine.options
         return to_mjcf(
             self.body,
-            timestep=options.physics_step,
-            integrator=options.integrator,
+            timestep=self.options.physics_step,
+            integrator=self.options.integrator,
             w_out=self.w_out,
         )
 
@@ -138,6 +159,7 @@ class Simulation(Reservoir):
         self.check_alteration(cut, masses)
         weights = None if masses is None else checked_masses(self.body, masses)
         self._engine.alter(checked_cut(self.body, cut), weights)
+        self._alterations += ((tuple(cut), weights),)
 
     @property
     def state(self) -> State:
@@ -161,16 +183,15 @@ class Simulation(Reservoir):
 
     def _identity(self) -> bytes:
         """Of the body's arrays and the settings."""
-        options = self._body_engine.options
-        name = getattr(options.springs, "name", options.springs)
-        parts = [repr(replace(options, springs=name)).encode()]
+        name = getattr(self.options.springs, "name", self.options.springs)
+        parts = [repr(replace(self.options, springs=name)).encode()]
         for field in fields(self.body):
             array = getattr(self.body, field.name)
             parts.append(repr(array.shape).encode() + array.tobytes())
         return b"".join(parts)
 
     def _described(self) -> str:
-        return f"{self.body!r} and these settings: {self._body_engine.options}"
+        return f"{self.body!r} and these settings: {self.options}"
 
     def _final_state(self) -> State:
         return self.state

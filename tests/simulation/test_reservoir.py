@@ -359,3 +359,39 @@ def test_a_heavier_body_and_a_cut_tendon_are_another_model():
     for damage in ({"cut": ("no",)}, {"masses": {"no": 1.0}}):
         with pytest.raises(UnknownNameError, match=r"unknown (tendon|body) 'no'"):
             reservoir.alter(**damage)
+
+
+def test_copies_of_a_reservoir_begin_anywhere_and_may_be_left_behind():
+    """Each as it is alone, bit for bit, beside one that blows up."""
+    reservoir = driven("RK4")[0]
+    rng, model = np.random.default_rng(1), reservoir.model
+    qpos, qvel = 0.1 * rng.standard_normal((3, model.nq)), rng.standard_normal((3, model.nv))
+    act = 0.1 * rng.standard_normal((3, model.na))
+    qvel[1] = 1e12
+    copies = reservoir.with_copies(3, threads=2, lenient=True)
+    copies.restart(qpos, qvel, act)
+    assert (copies.qvel == qvel).all()
+    assert (copies.act == act).all()
+    run = copies.rollout(500)
+    assert copies.alive.tolist() == [True, False, True]
+    copies.rollout(5)
+    assert copies.alive.tolist() == [True, False, True]
+    for copy in (0, 2):
+        reservoir.rollout(7)
+        reservoir.restart(qpos[copy], qvel[copy], act[copy])
+        assert (reservoir.rollout(500).signals == run.signals[copy]).all()
+    copies.reset()
+    assert copies.alive.all()
+    strict = reservoir.with_copies(2)
+    strict.restart(qpos[:2], qvel[:2])
+    with pytest.raises(McmjError, match="copy 1: the simulation blew up"):
+        strict.rollout(500)
+    with pytest.raises(InvalidArgumentError, match="act"):
+        copies.restart(act=np.zeros(99))
+
+
+def test_the_twin_leaves_nothing_behind(body):
+    twin = mcmj.Simulation(body, engine="twin")
+    assert twin.with_copies(2).alive.tolist() == [True, True]
+    with pytest.raises(InvalidArgumentError, match="lenient"):
+        twin.with_copies(2, lenient=True)

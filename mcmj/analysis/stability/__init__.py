@@ -1,5 +1,6 @@
-"""What a trained body's limit cycle is worth: multipliers, region of attraction, tolerances.
+"""What a trained rhythm is worth: multipliers, region of attraction, tolerances.
 
-The many copies run in the compiled twin of MuJoCo's Euler (`mcmj.reference.twin`); samples
-are repeated in MuJoCo itself (`confirm`).
+Of a planar body many copies run in the compiled twin of MuJoCo's Euler (`loop.ClosedLoop`);
+samples are repeated in MuJoCo itself (`confirm`). Of any other reservoir they run in MuJoCo
+(`mcmj.analysis.loops`), by finite differences only.
 """

@@ -6,13 +6,13 @@ threshold: infinite too for a copy whose orbit is good in the mean but strays fu
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
+from mcmj.analysis.loops.closed_loops import Loop
 from mcmj.analysis.stability.cycle import Cycle
-from mcmj.analysis.stability.loop import ClosedLoop
 from mcmj.metrics import orbits
 from mcmj.targets.limit_cycles import Target
 from mcmj.utils.validation import Array, require_number
@@ -76,7 +76,7 @@ class Survey:
 
 
 def survey(
-    loop: ClosedLoop,
+    loop: Loop,
     target: Target,
     states: Array,
     *,
@@ -126,50 +126,48 @@ def judge(
     return Survey(errors, times, threshold)
 
 
-def on_cycle(loop: ClosedLoop, cycle: Cycle, count: int) -> Array:
+def on_cycle(loop: Loop, cycle: Cycle, count: int) -> Array:
     """States (count, n) spread evenly over the cycle, in time."""
     stride = max(1, round(cycle.period / loop.timestep / count))
     return loop.trail(cycle.state, stride, count)
 
 
-def kicked(
-    loop: ClosedLoop, cycle: Cycle, strengths: Array, generator: np.random.Generator
-) -> Array:
+def kicked(loop: Loop, cycle: Cycle, strengths: Array, generator: np.random.Generator) -> Array:
     """States (B, n) of the cycle, with velocity kicks in random directions.
 
     Args:
-        strengths: (B,) RMS kick over the nodes' coordinates, in units of their RMS speed.
+        strengths: (B,) RMS kick over the velocities, in units of their RMS speed (cycle.scale).
     """
-    states, half = on_cycle(loop, cycle, len(strengths)), loop.size // 2
+    states, at = on_cycle(loop, cycle, len(strengths)), loop.velocities
     states = states[generator.permutation(len(states))]
-    kicks = generator.standard_normal((len(states), half))
+    kicks = generator.standard_normal((len(states), at.stop - at.start))
     kicks /= np.sqrt((kicks**2).mean(axis=1, keepdims=True))
-    states[:, half:] += strengths[:, None] * cycle.scale[half:] * kicks
+    states[:, at] += strengths[:, None] * cycle.scale[at] * kicks
     return states
 
 
 def pushed(
-    loop: ClosedLoop, states: Array, forces: Array | None, duration: float, *, refine: int = 1
+    loop: Loop, states: Array, forces: Array | None, duration: float, *, refine: int = 1
 ) -> Array:
-    """States (B, n) after constant horizontal forces (B, N) [N]; NaN for those that blew up.
+    """States (B, n) after constant forces (B, n_forces); NaN for those that blew up.
 
     Args:
-        forces: None: none.
+        forces: horizontal on a body's nodes, or on the degrees of freedom; None: none.
         duration: of the forces [s].
         refine: steps that much smaller. Hard blows move nodes faster than the cubic dampers
             allow at 1 ms (`mcmj.simulation.stepsize.limit`): without it the integrator fails,
-            not the body.
+            not the body. A reservoir keeps the step of its model: 1.
     """
-    fine = replace(loop, timestep=loop.timestep / refine)
+    fine = loop.refined(refine)
     rows = None if forces is None else forces[:, None]
     run = fine.run(states, round(duration / fine.timestep), forces=rows)
     return np.where(run.alive[:, None], run.states, np.nan)
 
 
 def scaled_starts(
-    loop: ClosedLoop, target: Target, scales: Array, phases: Array, *, duration: float
+    loop: Loop, target: Target, scales: Array, phases: Array, *, duration: float
 ) -> Array:
-    """States (B, n) that a teacher of `scales` (B,) times the target brings the body to.
+    """States (B, n) that a teacher of `scales` (B,) times the target brings the loop to.
 
     Args:
         phases: (B,) of the target when the teacher lets go, in periods.
@@ -177,7 +175,6 @@ def scaled_starts(
     """
     steps = round(duration / loop.timestep)
     before = (np.arange(steps) - steps) * loop.timestep
-    rest = np.concatenate([loop.body.positions[loop.body.free].ravel(), np.zeros(loop.size // 2)])
     states = []
     for first in range(0, len(scales), BATCH):
         some = slice(first, first + BATCH)
@@ -185,6 +182,6 @@ def scaled_starts(
             a * target.sample(before + phase * target.period)
             for a, phase in zip(scales[some], phases[some], strict=True)
         ])  # fmt: skip
-        run = loop.run(np.tile(rest, (len(teacher), 1)), offset=teacher, gate=0.0)
+        run = loop.run(np.tile(loop.rest, (len(teacher), 1)), offset=teacher, gate=0.0)
         states.append(np.where(run.alive[:, None], run.states, np.nan))
     return np.concatenate(states)

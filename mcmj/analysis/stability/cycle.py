@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import brentq
 
-from mcmj.analysis.stability.loop import ClosedLoop
+from mcmj.analysis.loops.closed_loops import Loop
 from mcmj.metrics import orbits
 from mcmj.utils.errors import McmjError
 from mcmj.utils.validation import Array, require_number
@@ -29,8 +29,8 @@ class Cycle:
         state: (n,) a point on it.
         tangent: (n,) dz/dt there.
         period: T [s].
-        scale: (n,) RMS excursion of positions [m] and RMS speed [m/s] over the nodes and one
-            period: the units in which states are compared.
+        scale: (n,) RMS excursion of positions and RMS speed over one period, one for all
+            coordinates of a kind (a body's nodes): the units in which states are compared.
         residual: |z(T) - z(0)| in these units (RMS over coordinates): how settled it is.
     """
 
@@ -47,7 +47,7 @@ def weights_at(fraction: float) -> Array:
     return np.linalg.solve(matrix, fraction ** np.arange(4.0))
 
 
-def around(loop: ClosedLoop, states: Array, steps: int) -> Array:
+def around(loop: Loop, states: Array, steps: int) -> Array:
     """States (4, B, n) after steps - 1, ..., steps + 2 steps."""
     rows = [loop.advance(states, steps - 1)]
     for _ in range(3):
@@ -55,7 +55,7 @@ def around(loop: ClosedLoop, states: Array, steps: int) -> Array:
     return np.stack(rows)
 
 
-def flow_map(loop: ClosedLoop, states: Array, duration: float) -> Array:
+def flow_map(loop: Loop, states: Array, duration: float) -> Array:
     """States (B, n) after any duration [s] of at least two steps, interpolated between steps.
 
     Raises:
@@ -67,12 +67,13 @@ def flow_map(loop: ClosedLoop, states: Array, duration: float) -> Array:
 
 
 def find_cycle(
-    loop: ClosedLoop,
+    loop: Loop,
     start: Array,
     guess: float,
     *,
     settle: float = 100.0,
     rounds: int = 10,
+    tolerance: float = TOLERANCE,
 ) -> Cycle:
     """The cycle that a state (n,) runs into.
 
@@ -80,6 +81,7 @@ def find_cycle(
         guess: expected period [s], right within 20 %.
         settle: let transients die for so long [s] before each attempt.
         rounds: attempts.
+        tolerance: largest residual of the cycle; contacts are solved to a tolerance of their own.
 
     Raises:
         DivergenceError: the loop blew up.
@@ -90,7 +92,7 @@ def find_cycle(
     for _ in range(rounds):
         state = loop.advance(state, max(1, round(settle / loop.timestep)))
         cycle = _cycle_at(loop, state, guess)
-        if cycle.residual <= TOLERANCE:
+        if cycle.residual <= tolerance:
             return cycle
     raise McmjError(
         f"no settled cycle after {rounds * settle:g} s: the state misses itself by "
@@ -98,7 +100,7 @@ def find_cycle(
     )
 
 
-def _cycle_at(loop: ClosedLoop, state: Array, guess: float) -> Cycle:
+def _cycle_at(loop: Loop, state: Array, guess: float) -> Cycle:
     h = loop.timestep
     outputs = loop.run(state, round(6 * guess / h)).outputs[0]
     rough = orbits.period(outputs, h, guess)
@@ -107,7 +109,7 @@ def _cycle_at(loop: ClosedLoop, state: Array, guess: float) -> Cycle:
     steps = round(rough / h) - 1
     before, here, after = (loop.advance(state, k)[0] for k in range(3))
     tangent = (after - before) / (2 * h)
-    scale = _scale(loop, state, steps)
+    scale = loop.scales(loop.trail(state[0], max(1, steps // SAMPLES), SAMPLES))
     normal = tangent / scale**2
     rows = around(loop, here[None], steps)[:, 0]
     heights = (rows - here) @ normal / (tangent @ normal * h)  # signed, in steps
@@ -122,12 +124,3 @@ def _cycle_at(loop: ClosedLoop, state: Array, guess: float) -> Cycle:
     back = flow_map(loop, here[None], period)[0]
     residual = float(np.sqrt((((back - here) / scale) ** 2).mean()))
     return Cycle(here, tangent, period, scale, residual)
-
-
-def _scale(loop: ClosedLoop, state: Array, steps: int) -> Array:
-    """RMS excursion and speed, each repeated for its half of the coordinates."""
-    states = loop.trail(state[0], steps // SAMPLES, SAMPLES)
-    half = loop.size // 2
-    excursion = float(np.sqrt(states[:, :half].var(axis=0).mean()))
-    speed = float(np.sqrt((states[:, half:] ** 2).mean()))
-    return np.repeat([excursion, speed], half)

@@ -1,8 +1,9 @@
-"""Floquet multipliers of a body's cycle and of the system it was taught.
+"""Floquet multipliers of a loop's cycle and of the system it was taught.
 
 The multipliers are the eigenvalues of the monodromy matrix D phi_T at a point of the cycle,
 phi_T the flow map over one period. One is 1, of a shift along the cycle; the cycle is stable
 if all others are smaller in magnitude (Guckenheimer and Holmes 1983, section 1.5).
+`multipliers_of` takes any loop; `floquet` adds the linearised step map, of planar bodies only.
 """
 
 from collections.abc import Callable
@@ -12,6 +13,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.integrate import solve_ivp
 
+from mcmj.analysis.loops.closed_loops import Loop
 from mcmj.analysis.stability.cycle import Cycle, flow_map
 from mcmj.analysis.stability.loop import ClosedLoop
 from mcmj.analysis.stability.variational import variational
@@ -27,22 +29,21 @@ Complex = npt.NDArray[np.complex128]
 DIFFERENCE = 1e-4
 
 
+NEUTRAL = 1e-3  # multipliers as near to 1: a double one of 1 splits by the root of an error
+
+
 @dataclass(frozen=True)
-class Floquet:
-    """Multipliers by two methods.
+class Multipliers:
+    """Multipliers by differences.
 
     Attributes:
         multipliers: (n,) by differences, largest first, the phase's (nearest to 1) ahead.
-        variational: (n,) by the linearised step map, in the same order.
-        disagreement: largest difference between the two sets, matched, for all n.
         phase_error: |D phi_T t - t| / |t|, t the tangent: how exactly the phase is neutral.
         monodromy: (n, n) by differences.
         leading_vector: (n,) eigenvector of the leading nontrivial multiplier.
     """
 
     multipliers: Complex
-    variational: Complex
-    disagreement: float
     phase_error: float
     monodromy: Array
     leading_vector: Complex
@@ -57,9 +58,33 @@ class Floquet:
         """Largest magnitude but for the phase's; below 1 the cycle is stable."""
         return float(abs(self.multipliers[1]))
 
+    @property
+    def transverse(self) -> Complex:
+        """(n - neutral,): multipliers that are not neutral, largest first."""
+        return self.multipliers[np.abs(self.multipliers - 1.0) > NEUTRAL]
 
-def differences(loop: ClosedLoop, cycle: Cycle, eps: float = DIFFERENCE) -> Array:
-    """Monodromy matrix (n, n) by central differences, 2 n copies at once in the twin.
+    @property
+    def neutral(self) -> int:
+        """Multipliers within NEUTRAL of 1: the phase's, and one for every symmetry of the loop
+        whose coordinate was not left out."""
+        return len(self.multipliers) - len(self.transverse)
+
+
+@dataclass(frozen=True)
+class Floquet(Multipliers):
+    """Multipliers of a planar body by two methods.
+
+    Attributes:
+        variational: (n,) by the linearised step map, in the same order.
+        disagreement: largest difference between the two sets, matched, for all n.
+    """
+
+    variational: Complex
+    disagreement: float
+
+
+def differences(loop: Loop, cycle: Cycle, eps: float = DIFFERENCE) -> Array:
+    """Monodromy matrix (n, n) by central differences, 2 n copies at once.
 
     Args:
         eps: perturbation of each coordinate, in units of cycle.scale.
@@ -87,25 +112,41 @@ def multipliers(monodromy: Array) -> tuple[Complex, Complex]:
     return values[order], vectors[:, order]
 
 
-def floquet(loop: ClosedLoop, cycle: Cycle) -> Floquet:
-    """Multipliers of a cycle by differences in the twin and by the linearised step map.
+def multipliers_of(loop: Loop, cycle: Cycle) -> Multipliers:
+    """Multipliers of a cycle of any loop, by differences.
 
     Raises:
         DivergenceError: a copy blew up.
     """
     monodromy = differences(loop, cycle)
     values, vectors = multipliers(monodromy)
-    _, exact = variational(loop, cycle.state, cycle.period)
-    other = _matched(multipliers(exact)[0], values)
     moved = monodromy @ cycle.tangent
     change = np.linalg.norm((moved - cycle.tangent) / cycle.scale)
-    return Floquet(
+    return Multipliers(
         multipliers=values,
-        variational=other,
-        disagreement=float(np.abs(values - other).max()),
         phase_error=float(change / np.linalg.norm(cycle.tangent / cycle.scale)),
         monodromy=monodromy,
         leading_vector=vectors[:, 1],
+    )
+
+
+def floquet(loop: ClosedLoop, cycle: Cycle) -> Floquet:
+    """Multipliers of a planar body's cycle by differences and by the linearised step map.
+
+    Raises:
+        DivergenceError: a copy blew up.
+        InvalidArgumentError: no planar body in the twin; `multipliers_of` takes any loop.
+    """
+    found = multipliers_of(loop, cycle)
+    _, exact = variational(loop, cycle.state, cycle.period)
+    other = _matched(multipliers(exact)[0], found.multipliers)
+    return Floquet(
+        multipliers=found.multipliers,
+        phase_error=found.phase_error,
+        monodromy=found.monodromy,
+        leading_vector=found.leading_vector,
+        variational=other,
+        disagreement=float(np.abs(found.multipliers - other).max()),
     )
 
 

@@ -1,4 +1,4 @@
-"""A body in closed loop as a map of its state vector, for many copies at once.
+"""A planar body in closed loop as a map of its state vector, for many copies at once.
 
     z_{k+1} = Phi(z_k, u_k),   z = (positions of the free nodes, their velocities), n = 4 x free
 
@@ -6,35 +6,20 @@ Phi is one step of the compiled twin of MuJoCo's Euler; z leaves nothing out, be
 readout is static and the outputs are fed back in the step in which they are read.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
-import numpy.typing as npt
 
+from mcmj.analysis.loops.closed_loops import LoopRun, advanced
 from mcmj.core.body import Body, require_plane, spring_lengths
 from mcmj.core.readout import Readout, checked_readout
 from mcmj.core.rollout_arguments import check_drive
 from mcmj.core.trajectory import State
 from mcmj.reference.twin.population import Population
-from mcmj.utils.errors import DivergenceError
+from mcmj.utils.errors import InvalidArgumentError
 from mcmj.utils.validation import Array, as_array, require_count, require_number
 
 METHOD = "semi_implicit_euler"
-
-
-@dataclass(frozen=True)
-class LoopRun:
-    """What became of B copies.
-
-    Attributes:
-        states: (B, n) after the last step.
-        outputs: (B, T, n_outputs) before each step; undefined after a copy blew up.
-        alive: (B,) whether a copy was finite to the end.
-    """
-
-    states: Array
-    outputs: Array
-    alive: npt.NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
@@ -72,6 +57,30 @@ class ClosedLoop:
     def size(self) -> int:
         """n, the dimension of the state."""
         return 4 * len(self.body.free)
+
+    @property
+    def velocities(self) -> slice:
+        """Which of the coordinates are velocities."""
+        return slice(self.size // 2, self.size)
+
+    @property
+    def n_forces(self) -> int:
+        """Number of forces: N, horizontal ones on all nodes."""
+        return self.body.n_forces
+
+    @property
+    def rest(self) -> Array:
+        """(n,): the body's positions, without motion."""
+        return np.concatenate([
+            self.body.positions[self.body.free].ravel(), np.zeros(self.size // 2)
+        ])  # fmt: skip
+
+    def scales(self, states: Array) -> Array:
+        """(n,): RMS excursion [m] and RMS speed [m/s] over the nodes, from states (S, n)."""
+        half = self.size // 2
+        excursion = float(np.sqrt(states[:, :half].var(axis=0).mean()))
+        speed = float(np.sqrt((states[:, half:] ** 2).mean()))
+        return np.repeat([excursion, speed], half)
 
     def vector(self, state: State) -> Array:
         """(n,): positions [m], then velocities [m/s], of the free nodes."""
@@ -136,17 +145,11 @@ class ClosedLoop:
         Raises:
             DivergenceError: a copy blew up.
         """
-        if steps == 0:
-            return states
-        run = self.run(states, steps)
-        if not run.alive.all():
-            raise DivergenceError(
-                f"copy {int(np.argmin(run.alive))} of the closed loop blew up within "
-                f"{steps * self.timestep:g} s; try a smaller step, or another readout",
-                time=0.0,
-                steps_done=0,
-            )
-        return run.states
+        return advanced(self, states, steps)
+
+    def refined(self, factor: int) -> "ClosedLoop":
+        """The same loop with steps that much smaller."""
+        return replace(self, timestep=self.timestep / factor)
 
     def _population(self, states: Array) -> Population:
         copies = len(states)
@@ -162,3 +165,17 @@ class ClosedLoop:
         now, free = population.kernel_state, self.body.free
         moving = np.stack([now.positions[:, free], now.velocities[:, free]], axis=1)
         return moving.reshape(len(moving), -1)
+
+
+def require_planar(loop: object, what: str) -> None:
+    """Raise unless a loop is that of a planar body.
+
+    Args:
+        what: only these can do.
+
+    Raises:
+        InvalidArgumentError: it is another kind of loop.
+    """
+    if not isinstance(loop, ClosedLoop):
+        wanted = f"a ClosedLoop: planar bodies only {what}"
+        raise InvalidArgumentError("loop", wanted, type(loop).__name__)

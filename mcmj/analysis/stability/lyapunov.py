@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mcmj.analysis.stability.loop import ClosedLoop
+from mcmj.analysis.loops.closed_loops import Loop
 from mcmj.utils.seeds import stream
 from mcmj.utils.validation import Array, require_count, require_number
 
@@ -37,7 +37,7 @@ class Exponent:
 
 
 def lyapunov_exponent(
-    loop: ClosedLoop,
+    loop: Loop,
     state: Array,
     *,
     interval: float,

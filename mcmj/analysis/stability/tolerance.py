@@ -7,8 +7,8 @@ import numpy as np
 import numpy.typing as npt
 from scipy.stats import binom
 
+from mcmj.analysis.loops.closed_loops import Loop
 from mcmj.analysis.stability.basin import pushed, survey
-from mcmj.analysis.stability.loop import ClosedLoop
 from mcmj.analysis.stability.phase import fed_back_noise
 from mcmj.targets.limit_cycles import Target
 from mcmj.utils.seeds import stream
@@ -102,7 +102,7 @@ def largest_tolerated(
 
 
 def force_tolerance(
-    loop: ClosedLoop,
+    loop: Loop,
     target: Target,
     states: Array,
     trial: Trial,
@@ -110,7 +110,7 @@ def force_tolerance(
     refine: int = 1,
     seed: int = 0,
 ) -> Tolerance:
-    """Constant random horizontal forces in [-F, F] on all nodes (as in Fig. 6b): largest F [N].
+    """Constant random forces in [-F, F] on a body's nodes (as in Fig. 6b) or joints: largest F.
 
     Every copy (B, n) has its own pattern, the same at every F.
 
@@ -118,7 +118,7 @@ def force_tolerance(
         refine: smaller steps while the forces act; see `basin.pushed`.
     """
     generator = stream(seed, "forces")
-    pattern = generator.uniform(-1.0, 1.0, (len(states), loop.body.n_nodes))
+    pattern = generator.uniform(-1.0, 1.0, (len(states), loop.n_forces))
 
     def recovers(amplitudes: Array) -> npt.NDArray[np.bool_]:
         after = pushed(loop, states, amplitudes[:, None] * pattern, trial.hold, refine=refine)
@@ -128,14 +128,14 @@ def force_tolerance(
 
 
 def noise_tolerance(
-    loop: ClosedLoop,
+    loop: Loop,
     target: Target,
     states: Array,
     trial: Trial,
     *,
     seed: int = 0,
 ) -> Tolerance:
-    """White noise on all lengths for a while (Fig. 6e): largest standard deviation [m].
+    """White noise on all signals for a while (Fig. 6e): largest standard deviation, [m] of lengths.
 
     Every copy (B, n) has its own noise, the same but for its size at every level. Arguments as
     for `force_tolerance`.
@@ -151,8 +151,6 @@ def noise_tolerance(
     return largest_tolerated(recovers, len(states), *NOISES, ratio=trial.ratio)
 
 
-def _recovered(
-    loop: ClosedLoop, target: Target, states: Array, trial: Trial
-) -> npt.NDArray[np.bool_]:
+def _recovered(loop: Loop, target: Target, states: Array, trial: Trial) -> npt.NDArray[np.bool_]:
     found = survey(loop, target, states, duration=trial.recovery, threshold=trial.threshold)
     return found.recovered

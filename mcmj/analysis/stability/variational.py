@@ -16,7 +16,7 @@ and A has w_fb (W_out^T dl/dp) in its x rows. All terms are kept, turning spring
 import numpy as np
 
 from mcmj.analysis.stability.cycle import weights_at
-from mcmj.analysis.stability.loop import ClosedLoop
+from mcmj.analysis.stability.loop import ClosedLoop, require_planar
 from mcmj.utils.errors import InvalidArgumentError
 from mcmj.utils.validation import Array
 
@@ -24,9 +24,14 @@ _ONE = np.eye(2)
 
 
 class StepMap:
-    """z -> Phi(z) and the parts of DPhi(z), for one state (n,)."""
+    """z -> Phi(z) and the parts of DPhi(z), for one state (n,) of a planar body.
+
+    Raises:
+        InvalidArgumentError: another kind of loop.
+    """
 
     def __init__(self, loop: ClosedLoop) -> None:
+        require_planar(loop, "are linearised exactly; `multipliers_of` takes any loop")
         body = loop.body
         self._body, self._step = body, loop.timestep
         free = body.free

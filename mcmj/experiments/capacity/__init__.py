@@ -1,4 +1,4 @@
-"""Memory and processing capacity of a body, and its ranks.
+"""Memory, processing capacity, ranks of a body or any model.
 
 Maps of them over stiffness, damping, size and input strength.
 """

@@ -11,7 +11,9 @@ from mcmj.experiments.capacity.run import run
 
 def show(result: Result, console: Console) -> None:
     """The result as tables."""
-    title = f"a body of {result.n_springs} springs, {result.config.symbols} symbols"
+    kind = "body" if result.config.reservoir is None else "reservoir"
+    counted = f"{result.n_signals} {result.signals.removeprefix('n_')}"
+    title = f"a {kind} of {counted}, {result.config.symbols} symbols"
     table = table_of(title, "measure", "value")
     for name, value in result.worth.measures.items():
         table.add_row(name, f"{value:.1f}")

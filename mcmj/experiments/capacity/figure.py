@@ -58,7 +58,7 @@ def _draw_delays(axes: Axes, by_delay: Mapping[int, Array]) -> None:
     last = int(np.flatnonzero(below)[-1]) if below.any() else 0
     axes.set(xlabel="delay of the oldest input [symbols]", ylabel="capacity",
              xlim=(-0.7, last + 0.7))  # fmt: skip
-    axes.set_title(f"Capacity of the body in MuJoCo, {below.sum():.1f} in all")
+    axes.set_title(f"Capacity in MuJoCo, {below.sum():.1f} in all")
     axes.legend(frameon=False)
 
 

@@ -1,32 +1,10 @@
-"""What a body is worth, and maps over settings."""
+"""What a body or a reservoir is worth, and maps over settings."""
 
 from dataclasses import dataclass
 
+from mcmj.analysis.capacities import Worth
 from mcmj.experiments.capacity.config import Config
-from mcmj.metrics.capacity import Capacities
 from mcmj.utils.validation import Array
-
-MEASURES = ("memory_capacity", "ipc_total", "kernel_rank", "generalisation_rank")
-
-
-@dataclass(frozen=True)
-class Worth:
-    """One body: its capacities and ranks."""
-
-    capacities: Capacities
-    kernel_rank: int
-    generalisation_rank: int
-
-    @property
-    def measures(self) -> dict[str, float]:
-        """By the names of MEASURES; the memory capacity starts at delay 1 (Jaeger 2002)."""
-        linear = self.capacities.of_degree(1)
-        return {
-            "memory_capacity": linear - self.capacities.of(((0, 1),)),
-            "ipc_total": self.capacities.total,
-            "kernel_rank": self.kernel_rank,
-            "generalisation_rank": self.generalisation_rank,
-        }
 
 
 @dataclass(frozen=True)
@@ -34,16 +12,21 @@ class Result:
     """What was measured.
 
     Attributes:
-        worth: of the body in MuJoCo.
-        n_springs: of it.
+        worth: of the body or the reservoir in MuJoCo.
+        n_signals: of it: springs of a body.
         maps: [map][measure] arrays over (stiffness, damping), and over (sizes, strengths); NaN
             where a body blew up.
     """
 
     config: Config
     worth: Worth
-    n_springs: int
+    n_signals: int
     maps: dict[str, dict[str, Array]]
+
+    @property
+    def signals(self) -> str:
+        """What n_signals counts, by its name in metrics.json."""
+        return "n_springs" if self.config.reservoir is None else "n_signals"
 
     @property
     def by_delay(self) -> dict[int, Array]:
@@ -61,6 +44,6 @@ class Result:
             "memory_by_delay": self.by_delay[1],
             "ipc_bound": found.rank,
             "ipc_threshold": found.threshold,
-            "n_springs": self.n_springs,
+            self.signals: self.n_signals,
             "maps": self.maps,
         }

@@ -1,8 +1,9 @@
 """What a body is worth: memory and processing capacity, kernel and generalisation rank.
 
 Symbols, independent and uniform in [-1, 1], push the body for `hold` seconds each; its state is
-its lengths at the end of each. One body in MuJoCo; then maps over stiffness and damping, and
-over size and input strength, by the compiled twin (same bits but for rounding, faster).
+its lengths at the end of each (`mcmj.analysis.capacities`, which takes any reservoir). One body in
+MuJoCo; then maps over stiffness and damping, and over size and input strength, by the compiled
+twin (same bits but for rounding, faster).
 """
 
 from dataclasses import replace
@@ -12,22 +13,30 @@ from typing import Any
 
 import numpy as np
 
+from mcmj.analysis.capacities import MEASURES, Worth, capacities_of
 from mcmj.core.body import Body
 from mcmj.core.random_body import BodySettings, draw_body
 from mcmj.experiments.blow_ups import or_lost
 from mcmj.experiments.capacity.config import TIMESTEP, Config
-from mcmj.experiments.capacity.result import MEASURES, Result, Worth
-from mcmj.metrics.capacity import generalisation_rank, kernel_rank, processing_capacity
-from mcmj.simulation.ensemble import Ensemble
-from mcmj.simulation.held_symbols import held_states
+from mcmj.experiments.capacity.result import Result
+from mcmj.simulation.reservoir import Reservoir
 from mcmj.simulation.simulation import Simulation
 from mcmj.utils.progress import OnSteps
-from mcmj.utils.seeds import stream
 from mcmj.utils.validation import Array
 
 
 def run(config: Config, *, on_steps: OnSteps = lambda steps: None) -> Result:
-    """Measure one body in MuJoCo, then the maps' bodies."""
+    """Measure one body in MuJoCo, then the maps' bodies; or a reservoir's file.
+
+    Raises:
+        BodyFileError: no such file, or not that of a reservoir.
+        DivergenceError: the body or the reservoir blew up.
+    """
+    if config.reservoir is not None:
+        model = Reservoir.open(config.reservoir)
+        worth = capacities_of(model, config)
+        on_steps(1)
+        return Result(config, worth, model.n_signals, {})
     body = draw_body(config.seed, config.settings)
     worth = measure(config, body, config.strength, config.symbols, engine="mujoco")
     on_steps(1)
@@ -44,29 +53,8 @@ def measure(config: Config, body: Body, strength: float, symbols: int, *, engine
     Raises:
         DivergenceError: the body blew up.
     """
-    u = stream(config.seed, "probe_inputs").uniform(-1.0, 1.0, (config.washout + symbols, 1))
-    options: dict[str, Any] = {
-        "timestep": TIMESTEP,
-        "integrator": config.integrator,
-        "engine": engine,
-    }
-    sim = Simulation(body, **options)
-    states = held_states(sim, strength * u, config.hold_steps)[config.washout :]
-    capacities = processing_capacity(states, u[config.washout :, 0], config.max_delays)
-    streams = stream(config.seed, "probe_inputs").uniform(
-        -1.0, 1.0, (config.streams, config.stream_symbols, 1)
-    )
-    alike = streams.copy()
-    alike[:, config.stream_symbols - config.shared :] = streams[:1, -config.shared :]
-    ends = []
-    for shown in (streams, alike):
-        copies = Ensemble(body, copies=config.streams, threads=config.threads, **options)
-        ends.append(held_states(copies, strength * shown, config.hold_steps)[:, -1])
-    return Worth(
-        capacities,
-        kernel_rank(ends[0], config.resolution),
-        generalisation_rank(ends[1], config.resolution),
-    )
+    sim = Simulation(body, timestep=TIMESTEP, integrator=config.integrator, engine=engine)
+    return capacities_of(sim, replace(config, strength=strength, symbols=symbols))
 
 
 def _scaled(config: Config) -> tuple[tuple[int, int], list[tuple[BodySettings, float]]]:

@@ -6,8 +6,9 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from mcmj.experiments.filters.config import IN_SYMBOLS, TIMESTEP
-from mcmj.experiments.filters.result import FilterResult, Result
+from mcmj.experiments.filters.result import Result
 from mcmj.experiments.filters.switching import SwitchResult
+from mcmj.learning.filters import FilterResult
 from mcmj.pictures.plotting import OUTPUT_STYLES, TARGET_STYLE, new_figure
 
 SHOWN_SECONDS, SHOWN_SYMBOLS = 3.0, 80

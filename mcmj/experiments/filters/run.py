@@ -1,23 +1,18 @@
 """Open-loop filters: what a body computes from its input, against regression without a body.
 
-The body is driven by the input alone; a linear readout of its lengths is fitted on one stretch
-and its nrmse_std taken on the next. The baselines are linear regressions on the input: of the
-moment, and with delays. What the body does better than the second is nonlinear; what it does
-better than the first is that, or memory (a plain delay is no feat beside the second).
+`mcmj.learning.filters` does the same with any reservoir, and says what the baselines are.
 """
 
 from mcmj.core.random_body import draw_body
 from mcmj.experiments.filters.config import IN_SYMBOLS, SAMPLED, TIMESTEP, Config
-from mcmj.experiments.filters.result import FilterResult, Result
+from mcmj.experiments.filters.result import Result
 from mcmj.experiments.filters.switching import run_switch
-from mcmj.learning.regression import fit_readout
-from mcmj.metrics import orbits
+from mcmj.learning.filters import FilterResult, fit_filter
 from mcmj.simulation.held_symbols import held_states
 from mcmj.simulation.simulation import Simulation
 from mcmj.targets.filter_tasks import (
     FilterTask,
     delayed_recall,
-    delays,
     narma10,
     toolbox_narma,
     volterra,
@@ -38,10 +33,11 @@ def run(config: Config, *, on_steps: OnSteps = lambda steps: None) -> Result:
             continue
         task = make_task(config, name)
         if name in IN_SYMBOLS:
-            symbols = drive(config, task) if symbols is None else symbols
-            filters[name] = fit_filter(config, task, symbols)
+            states = symbols = drive(config, task) if symbols is None else symbols
         else:
-            filters[name] = fit_filter(config, task, drive(config, task))
+            states = drive(config, task)
+        train, test = _parts(config, sampled=name in SAMPLED)
+        filters[name] = fit_filter(task, states, train, test, config.taps)
         on_steps(1)
     switch = None
     if "switch" in config.tasks:
@@ -75,19 +71,6 @@ def drive(config: Config, task: FilterTask) -> Array:
     return held_states(sim, gain * task.inputs, hold) - body.rest_lengths
 
 
-def fit_filter(config: Config, task: FilterTask, states: Array) -> FilterResult:
-    """Fit readouts of the states and of the baselines, and test them."""
-    lags = delays(task.inputs, config.taps, task.tap_spacing)
-    train, test = _parts(config, sampled=task.name in SAMPLED)
-    wanted = task.targets[test]
-    outputs = {
-        name: _run_readout(x, task.targets, train, test)
-        for name, x in (("", states), ("baseline_", lags), ("input_only_", task.inputs))
-    }
-    errors = {f"{name}nrmse_std": orbits.nrmse_std(y, wanted) for name, y in outputs.items()}
-    return FilterResult(task, errors, outputs[""], wanted)
-
-
 def _parts(config: Config, *, sampled: bool) -> tuple[slice, slice]:
     """The samples to fit on, and those to test on."""
     if sampled:
@@ -96,10 +79,3 @@ def _parts(config: Config, *, sampled: bool) -> tuple[slice, slice]:
         return slice(first, last, SPARSE), slice(last, None)
     last = config.washout_symbols + config.symbols
     return slice(config.washout_symbols, last), slice(last, None)
-
-
-def _run_readout(x: Array, y: Array, train: slice, test: slice) -> Array:
-    """Outputs on the test part of a readout with a bias, fitted on the other."""
-    w_out = fit_readout(x[train], y[train], bias=True)
-    found: Array = x[test] @ w_out[:-1] + w_out[-1]
-    return found

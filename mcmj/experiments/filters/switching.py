@@ -3,16 +3,18 @@
 Pulses of +1 or -1 come now and then; the output must be the sign of the last one, however long
 ago. A fading memory cannot: after a pause longer than the body's own time scales it has nothing
 left. With the output fed back the body is taught two stable states, which a pulse switches.
+`learn_switch` takes any reservoir.
 """
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
-from mcmj.core.body import Body
 from mcmj.core.random_body import MOST_NODES, random_body
 from mcmj.learning.regression import Regression
 from mcmj.metrics import orbits
+from mcmj.simulation.reservoir import Reservoir
 from mcmj.simulation.simulation import Simulation
 from mcmj.targets.filter_tasks import FilterTask, smooth_noise, switch
 from mcmj.utils.seeds import stream
@@ -90,46 +92,65 @@ class SwitchResult:
 
 
 def run_switch(config: SwitchConfig, seed: int, *, engine: str = "mujoco") -> SwitchResult:
-    """Teach the same body with and without feedback, then test both on long pauses."""
+    """Teach the same random body with and without feedback, then test both on long pauses."""
     body = random_body(seed, config.switch_nodes, n_inputs=1, n_outputs=1, input_scale=INPUT_SCALE)
-    rng = stream(seed, "task_inputs")
-    lesson = make_switch(config, rng, config.lesson, config.train_pauses)
-    test = make_switch(config, rng, config.exam, config.test_pauses)
+    return learn_switch(config, Simulation(body, timestep=TIMESTEP, engine=engine), seed)
+
+
+def learn_switch(config: SwitchConfig, reservoir: Reservoir, seed: int) -> SwitchResult:
+    """Teach a reservoir with and without feedback, each time from its start, and test both.
+
+    Args:
+        reservoir: with one input and one output; it keeps the readout taught last.
+
+    Raises:
+        DivergenceError: it blew up.
+        InvalidArgumentError: another number of inputs or outputs.
+    """
+    rng, timestep = stream(seed, "task_inputs"), reservoir.timestep
+    lesson = make_switch(config, rng, config.lesson, config.train_pauses, timestep)
+    test = make_switch(config, rng, config.exam, config.test_pauses, timestep)
     noise = config.noise * smooth_noise(
-        stream(seed, "teacher_noise"), len(lesson.targets), TIMESTEP, config.noise_time
+        stream(seed, "teacher_noise"), len(lesson.targets), timestep, config.noise_time
     )
     outputs = {}
     for name, teacher in (("feedback", lesson.targets + noise), ("open", None)):
-        w_out = teach_switch(config, body, lesson, teacher, engine)
-        sim = Simulation(body, w_out=w_out, timestep=TIMESTEP, engine=engine)
+        w_out = teach_switch(config, reservoir, lesson, teacher)
+        reservoir.reset()
+        reservoir.set_readout(w_out)
         gate = 0.0 if teacher is None else 1.0
-        outputs[name] = sim.rollout(inputs=test.inputs, gate=gate).get("outputs")
+        outputs[name] = reservoir.rollout(inputs=test.inputs, gate=gate).get("outputs")
     held = {name: pauses_held(test, y) for name, y in outputs.items()}
     return SwitchResult(test, outputs, held)
 
 
 def make_switch(
-    config: SwitchConfig, rng: np.random.Generator, duration: float, gaps: tuple[float, float]
+    config: SwitchConfig,
+    rng: np.random.Generator,
+    duration: float,
+    gaps: tuple[float, float],
+    timestep: float = TIMESTEP,
 ) -> FilterTask:
     """Pulses and the wanted output for so long [s]."""
-    steps = round(duration / TIMESTEP)
-    return switch(rng, steps, TIMESTEP, pulse=config.pulse, gaps=gaps)
+    steps = round(duration / timestep)
+    return switch(rng, steps, timestep, pulse=config.pulse, gaps=gaps)
 
 
 def teach_switch(
-    config: SwitchConfig, body: Body, lesson: FilterTask, teacher: Array | None, engine: str
+    config: SwitchConfig, reservoir: Reservoir, lesson: FilterTask, teacher: Array | None
 ) -> Array:
-    """Readout (L + 1, 1), taught with the teacher fed back, or with nothing fed back."""
-    sim = Simulation(body, timestep=TIMESTEP, engine=engine)
-    first, seen = round(WASHOUT / TIMESTEP), 0
+    """Readout (n_signals + 1, 1), taught with the teacher fed back, or with nothing fed back."""
+    reservoir.reset()
+    first, seen = round(WASHOUT / reservoir.timestep), 0
     regression = Regression(bias=True)
-    for part in sim.stream(inputs=lesson.inputs, offset=teacher, gate=0.0, record=("lengths",)):
-        lengths = part.get("lengths")
-        rows = np.arange(seen, seen + len(lengths))
+    drive: dict[str, Any] = {"inputs": lesson.inputs, "offset": teacher, "gate": 0.0}
+    for part in reservoir.stream(**drive, record=("signals",)):
+        signals = part.get("signals")
+        rows = np.arange(seen, seen + len(signals))
         learned = rows >= first
         if learned.any():
-            regression.add(lengths[learned], lesson.targets[rows[learned]])
-        seen += len(lengths)
+            regression.add(signals[learned], lesson.targets[rows[learned]])
+        seen += len(signals)
     return regression.solve(config.ridge_per_row * regression.weight).w_out
 
 

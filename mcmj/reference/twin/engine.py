@@ -3,6 +3,7 @@
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from mcmj.core.body import Body, spring_lengths
 from mcmj.core.integrators import integrator_named
@@ -46,6 +47,15 @@ class TwinEngine:
         """All copies back to the start, at rest, time 0."""
         self._population.set_states([rest(self.body)] * self.copies)
         self._population.steps_done = 0
+
+    @property
+    def alive(self) -> npt.NDArray[np.bool_]:
+        """(copies,) all: one that blows up is an error."""
+        return np.ones(self.copies, np.bool_)
+
+    def leave_behind(self) -> None:
+        """As `model`."""
+        raise InvalidArgumentError("lenient", "False with engine 'twin'", "True")
 
     def set_readout(self, w_out: Array | None) -> None:
         """Readouts (rows, n_outputs) for all copies, or (copies, rows, n_outputs)."""
