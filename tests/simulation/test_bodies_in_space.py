@@ -18,7 +18,12 @@ from mcmj.simulation.phases import Phase, Schedule
 from mcmj.simulation.run_phases import run_schedule
 from mcmj.simulation.stepsize.limit import recommend, stability_limit
 from mcmj.simulation.trajectory_files.npz import load_trajectory, save_trajectory
-from mcmj.utils.errors import DivergenceError, InvalidArgumentError, StabilityWarning
+from mcmj.utils.errors import (
+    DivergenceError,
+    InvalidArgumentError,
+    StabilityWarning,
+    TrajectoryFileError,
+)
 
 T = 200
 
@@ -269,3 +274,16 @@ def test_a_trajectory_in_space_is_kept(tmp_path, suffix):
     assert again.body == body
     assert np.array_equal(again.trajectory.positions, kept.positions)
     assert np.array_equal(again.trajectory.velocities, kept.velocities)
+
+
+def test_positions_and_velocities_are_in_one_space_which_is_the_bodys(tmp_path):
+    flat, path = planar(), tmp_path / "run.npz"
+    kept = run(flat, kicked(flat), steps=20)
+    raised = np.concatenate([kept.positions, kept.positions[..., :1]], axis=-1)
+    moved = replace(kept, positions=raised)
+    save_trajectory(path, moved)
+    with pytest.raises(TrajectoryFileError, match="in one space"):
+        load_trajectory(path)
+    save_trajectory(path, replace(moved, velocities=raised), body=flat)
+    with pytest.raises(TrajectoryFileError, match="positions: expected 2 columns"):
+        load_trajectory(path)

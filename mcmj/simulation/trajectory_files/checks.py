@@ -44,7 +44,7 @@ def checked_trajectory(times: object, recorded: Mapping[str, object]) -> Traject
     """
     instants = _numbers("times", times, (None,))
     arrays: dict[str, Any] = {}
-    copies = set()
+    copies, spaces = set(), set()
     for name in RECORDABLE:
         if name in recorded:
             axes = -TIME_AXIS[name]  # without that of an ensemble's copies
@@ -53,6 +53,10 @@ def checked_trajectory(times: object, recorded: Mapping[str, object]) -> Traject
             rest = (None,) if axes == 2 else (None, dimensions)
             arrays[name] = _numbers(name, recorded[name], (*lead, len(instants), *rest))
             copies.add(arrays[name].shape[:-axes])
+            if axes == 3:
+                spaces.add(arrays[name].shape[-1])
+    if len(spaces) > 1:
+        raise InvalidArgumentError("axis", "positions and velocities in one space", sorted(spaces))
     if len(copies) > 1:
         raise InvalidArgumentError("copies", "the same number in every array", sorted(copies))
     return Trajectory(instants, **arrays)
@@ -62,13 +66,15 @@ def check_body_fits(trajectory: Trajectory, body: Body) -> None:
     """Raise unless the arrays can be a run of the body.
 
     Raises:
-        InvalidArgumentError: another number of springs, outputs or nodes.
+        InvalidArgumentError: another number of springs, outputs, nodes or dimensions.
     """
     for name, axis, count in (
         ("lengths", -1, body.n_springs),
         ("outputs", -1, body.n_outputs),
         ("positions", -2, body.n_nodes),
         ("velocities", -2, body.n_nodes),
+        ("positions", -1, body.dimensions),
+        ("velocities", -1, body.dimensions),
     ):
         array = getattr(trajectory, name)
         if array is not None and array.shape[axis] != count:
