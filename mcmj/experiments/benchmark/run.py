@@ -181,7 +181,7 @@ def growth(config: Config, body: Body) -> dict[str, object]:
 
 def learning_costs(config: Config, body: Body) -> dict[str, object]:
     """A step in which a readout is corrected every 5 ms, over one in closed loop."""
-    n, steps = body.n_springs, max(CORRECT_EVERY, config.steps)
+    n, steps = body.n_springs, 8 * config.steps  # beside 1 ms for a model of its own
     simulation = Simulation(body, w_out=np.zeros((n + 1, body.n_outputs)))
     targets = np.zeros((-(-steps // CORRECT_EVERY), body.n_outputs))
     stretch = Stretch(targets, np.zeros((steps, body.n_outputs)))
