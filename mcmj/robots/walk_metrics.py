@@ -23,7 +23,7 @@ class Walk:
         times: (T,) since the walk's start [s].
         trunk: (copies, T, 7) position [m] and orientation (quaternion) of the trunk.
         outputs: (copies, T, n_legs) x_i.
-        contact: (copies, T, n_legs) force of the ground on each foot [N]; of a trunk a step ago.
+        contact: (copies, T, n_legs) force of the ground on each foot [N].
         power: (copies, T) positive mechanical power of all servos [W].
         joints: (copies, T, nq) all of MuJoCo's qpos, if asked for.
     """
