@@ -23,7 +23,7 @@ class Walk:
         times: (T,) since the walk's start [s].
         trunk: (copies, T, 7) position [m] and orientation (quaternion) of the trunk.
         outputs: (copies, T, n_legs) x_i.
-        contact: (copies, T, n_legs) force of the ground on each foot [N], a step ago.
+        contact: (copies, T, n_legs) force of the ground on each foot [N].
         power: (copies, T) positive mechanical power of all servos [W].
         joints: (copies, T, nq) all of MuJoCo's qpos, if asked for.
     """
@@ -65,7 +65,7 @@ def joined(parts: Sequence[Walk]) -> Walk:
         pieces = [getattr(part, name) for part in parts]
         arrays[name] = None if pieces[0] is None else np.concatenate(pieces, axis=1)
     count = sum(len(part.times) for part in parts)
-    return Walk(step * np.arange(1, count + 1, dtype=np.float64), **arrays)
+    return Walk(parts[0].times[0] + step * np.arange(count, dtype=np.float64), **arrays)
 
 
 def fallen(trunk: Array, leg: float, slope: float = 0.0) -> npt.NDArray[np.bool_]:

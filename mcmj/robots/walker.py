@@ -21,7 +21,7 @@ from mcmj.robots.walk_metrics import Walk
 from mcmj.robots.walk_scene import ROBOT, TRUNK, Terrain, walking_model
 from mcmj.simulation.reservoir import Reservoir
 from mcmj.targets.gaits import LEGS
-from mcmj.utils.validation import MOST_STEPS, Array, require_count, require_number
+from mcmj.utils.validation import MOST_STEPS, Array, as_array, require_count, require_number
 
 PUSH_DURATION = 0.1  # s
 CHUNK = 2048  # steps of all copies whose records are thinned at a time
@@ -124,17 +124,18 @@ class Walker(Reservoir):
         parts = []
         for samples, impulse in ((pushed, push), (count - pushed, (0.0, 0.0))):
             if impulse is not None and samples > 0:
-                force = np.zeros((*np.shape(impulse)[:-1], 3))
-                force[..., :2] = np.asarray(impulse) / PUSH_DURATION
+                lead = np.shape(impulse)[:-1]
+                force = np.zeros((*lead, 3))
+                force[..., :2] = as_array("push", impulse, (*lead, 2)) / PUSH_DURATION
                 run = self.stream(
                     samples * every, forces={TRUNK: force},
                     record=("outputs", "qpos", "sensordata"), chunk=chunk,
                 )  # fmt: skip
                 parts += [part.thinned(every) for part in run]
-        return self._walk_of(join(parts), joints)
+        return self._walk_of(join(parts), every * self.timestep, joints)
 
-    def _walk_of(self, run: Trajectory, joints: bool) -> Walk:
-        """Samples of a rollout as a walk; the first axis of its arrays are the copies."""
+    def _walk_of(self, run: Trajectory, sample: float, joints: bool) -> Walk:
+        """Samples of a rollout, so far apart [s], as a walk."""
         outputs, qpos, sensors = (
             run.get(name).reshape(self.copies or 1, len(run), -1)
             for name in ("outputs", "qpos", "sensordata")
@@ -148,7 +149,7 @@ class Walker(Reservoir):
 
         power = np.maximum(measured("_force") * measured("_speed"), 0.0)
         return Walk(
-            times=run.times - run.times[0],
+            times=sample * np.arange(len(run), dtype=np.float64),
             trunk=qpos[..., self._nodes : self._nodes + 7],
             outputs=outputs[..., : len(LEGS)],
             contact=measured("_contact"),
