@@ -16,11 +16,14 @@ if TYPE_CHECKING:
     from mcmj.core.body import Body as Body
     from mcmj.core.callbacks.spring_laws import SpringLaw as SpringLaw
     from mcmj.core.random_body import random_body as random_body
+    from mcmj.learning.force_learning import ForceLearning as ForceLearning
+    from mcmj.learning.force_learning import force_learn as force_learn
     from mcmj.learning.lessons import Teaching as Teaching
     from mcmj.learning.regression import fit_readout as fit_readout
     from mcmj.learning.teaching import teach as teach
     from mcmj.mjcf.read import from_mjcf as from_mjcf
     from mcmj.mjcf.write import to_mjcf as to_mjcf
+    from mcmj.pictures.film_of import film as film
     from mcmj.simulation.ensemble import Ensemble as Ensemble
     from mcmj.simulation.phases import Phase as Phase
     from mcmj.simulation.phases import RandomForces as RandomForces
@@ -37,6 +40,7 @@ __version__ = "0.1.0"
 _PLACES = {
     "Body": "core.body",
     "Ensemble": "simulation.ensemble",
+    "ForceLearning": "learning.force_learning",
     "McmjError": "utils.errors",
     "Phase": "simulation.phases",
     "RandomForces": "simulation.phases",
@@ -46,7 +50,9 @@ _PLACES = {
     "SpringLaw": "core.callbacks.spring_laws",
     "Target": "targets.limit_cycles",
     "Teaching": "learning.lessons",
+    "film": "pictures.film_of",
     "fit_readout": "learning.regression",
+    "force_learn": "learning.force_learning",
     "from_mjcf": "mjcf.read",
     "random_body": "core.random_body",
     "run_schedule": "simulation.run_phases",

@@ -41,28 +41,38 @@ BELOW = {
     "simulation.stepsize",
     "simulation.models",
 }  # they import it
-ABOVE = {"simulation.trajectory_files", "learning.environments", "analysis.stability"}
+ABOVE = {
+    "analysis.stability",
+    "learning.environments",
+    "pictures.window",
+    "simulation.trajectory_files",
+}
 MOST_MODULES, MOST_ROOT_ENTRIES = 14, 16
 
 MUJOCO = {
     "analysis.loops.chart",
     "core.callbacks.install",
-    "core.callbacks.leapfrog",
+    "core.callbacks.library",
     "core.callbacks.offsets",
     "experiments.benchmark.full_scene",
     "experiments.benchmark.run",
     "experiments.limit_cycle.loop_cost",  # times bare mj_step
+    "learning.environments.environment",
     "mjcf.check",
     "mjcf.read",
     "pictures.opengl",
     "pictures.opengl_view",
     "pictures.trunk_video",
-    "pictures.viewer",
+    "pictures.film",
+    "pictures.model_view",
+    "pictures.window.body_viewer",
+    "pictures.window.plots",
+    "pictures.window.viewer",
     "pictures.walk_video",
     "robots.trunk_walker",
     "robots.walk_scene",
-    "robots.walker",
     "simulation.batch_engine",
+    "simulation.corrected_run",
     "simulation.damage",
     "simulation.interactive",
     "simulation.model_engine",

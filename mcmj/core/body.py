@@ -1,11 +1,12 @@
-"""A compliant body: point masses in the plane joined by nonlinear springs.
+"""A compliant body: point masses in the plane or in space, joined by nonlinear springs.
 
 The body is the reservoir. Its physics (Hauser et al. 2012, Eqs. 6 and 7), for node i
 and spring j with x1 = l - l0 and x2 = dl/dt:
 
-    m_i p_x'' = F_x + w_in[i] . u + w_fb[i] . y
-    m_i p_y'' = F_y
+    m_i p_i'' = F_i + (w_in[i] . u + w_fb[i] . y) e
     pull_j    = k1 x1 + k3 x1^3 + d1 x2 + d3 x2^3      along the spring's axis
+
+F are the pulls of the node's springs; e is `direction`, x in the paper.
 """
 
 from dataclasses import dataclass, fields
@@ -16,6 +17,7 @@ import numpy.typing as npt
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
+from mcmj.core.space import checked_direction, checked_positions, held_nodes
 from mcmj.utils.errors import InvalidArgumentError
 from mcmj.utils.validation import Array, as_array, require_above
 
@@ -25,20 +27,23 @@ class Body:
     """Masses, springs and channels of a body; every array is checked, then read-only.
 
     Attributes:
-        positions: (N, 2) start positions [m]; the body starts there, at rest.
+        positions: (N, D) start positions [m], D = 2 or 3; the body starts there, at rest.
         springs: (L, 2) node indices of each spring's ends.
         k1, k3: (L,) linear [N/m] and cubic [N/m^3] stiffness, k1 > 0, k3 >= 0.
         d1, d3: (L,) linear [N s/m] and cubic [N s^3/m^3] damping, d1 > 0, d3 >= 0.
         rest_lengths: (L,) l0 [m]; default: the distances at the start.
-        fixed: (N,) bool; default: the leftmost and the rightmost node.
-        w_in: (N, n_inputs) horizontal force on each node per unit input [N]; default: none.
-        w_fb: (N, n_outputs) horizontal force on each node per unit output [N]; default: none.
+        fixed: (N,) bool; default: the leftmost and the rightmost node, and in three dimensions
+            the node farthest from the line through them, about which the body would turn.
+        w_in: (N, n_inputs) force along `direction` on each node per unit input [N]; default: none.
+        w_fb: (N, n_outputs) the same per unit output [N]; default: none.
         masses: (N,) [kg]; default: 1. Weights and masses of fixed nodes have no effect.
+        direction: (D,) unit vector along which inputs, feedback and a rollout's forces act; of
+            any other length when given; default: x.
 
     Raises:
         InvalidArgumentError: wrong shape, NaN, an index out of range, a spring that joins a
             node to itself or doubles another, coincident nodes, a body in several pieces, or
-            k1, d1, rest length or mass that is not positive.
+            k1, d1, rest length or mass that is not positive, or direction 0.
     """
 
     positions: Array
@@ -52,9 +57,10 @@ class Body:
     w_in: Array = None  # type: ignore[assignment]
     w_fb: Array = None  # type: ignore[assignment]
     masses: Array = None  # type: ignore[assignment]
+    direction: Array = None  # type: ignore[assignment]
 
     def __post_init__(self) -> None:
-        positions = _checked_positions(self.positions)
+        positions = checked_positions(self.positions)
         springs = _checked_springs(self.springs, positions)
         n, n_springs = len(positions), len(springs)
         arrays: dict[str, npt.NDArray[Any]] = {"positions": positions, "springs": springs}
@@ -72,6 +78,7 @@ class Body:
             np.ones(n) if self.masses is None else as_array("masses", self.masses, (n,))
         )
         require_above("masses", arrays["masses"], 0.0)
+        arrays["direction"] = checked_direction(self.direction, positions.shape[1])
         for name in ("w_in", "w_fb"):
             given = getattr(self, name)
             arrays[name] = np.zeros((n, 0)) if given is None else as_array(name, given, (n, None))
@@ -101,6 +108,16 @@ class Body:
         return len(self.positions)
 
     @property
+    def dimensions(self) -> int:
+        """D, 2 or 3."""
+        return int(self.positions.shape[1])
+
+    @property
+    def pushed_along_x(self) -> bool:
+        """Whether inputs, feedback and forces act along x."""
+        return bool(self.direction[0] == 1.0 and not self.direction[1:].any())
+
+    @property
     def n_springs(self) -> int:
         """L."""
         return len(self.springs)
@@ -126,31 +143,31 @@ class Body:
         return np.flatnonzero(~self.fixed)
 
     def __repr__(self) -> str:
+        space = "" if self.dimensions == 2 else " in space"
         return (
-            f"Body({self.n_nodes} nodes, {self.n_springs} springs, {int(self.fixed.sum())} fixed, "
-            f"{self.n_inputs} inputs, {self.n_outputs} outputs)"
+            f"Body({self.n_nodes} nodes{space}, {self.n_springs} springs, "
+            f"{int(self.fixed.sum())} fixed, {self.n_inputs} inputs, {self.n_outputs} outputs)"
         )
 
 
 def spring_lengths(positions: Array, springs: npt.NDArray[np.int64]) -> Array:
-    """Lengths |p_b - p_a| (..., L) [m] of springs (a, b) at positions (..., N, 2)."""
+    """Lengths |p_b - p_a| (..., L) [m] of springs (a, b) at positions (..., N, D)."""
     ends = positions[..., springs, :]
     found: Array = np.linalg.norm(ends[..., 1, :] - ends[..., 0, :], axis=-1)
     return found
 
 
-def _checked_positions(value: object) -> Array:
-    positions = as_array("positions", value, (None, 2))
-    if len(positions) < 2:
-        raise InvalidArgumentError("positions", "at least 2 nodes", f"{len(positions)}")
-    order = np.lexsort(positions.T)
-    same = np.flatnonzero((np.diff(positions[order], axis=0) == 0).all(axis=1))
-    if same.size:
-        a, b = sorted(order[same[0] : same[0] + 2].tolist())
-        raise InvalidArgumentError(
-            "positions", "distinct points", f"nodes {a} and {b} both at {positions[a]}"
-        )
-    return positions
+def require_plane(body: Body, what: str) -> None:
+    """Raise unless a body is planar and pushed along x, which is all that `what` knows.
+
+    Raises:
+        InvalidArgumentError: names the body, and says what it is.
+    """
+    if body.dimensions != 2:
+        raise InvalidArgumentError("body", f"a planar one for {what}", f"{body!r}")
+    if not body.pushed_along_x:
+        got = f"one pushed along {body.direction}"
+        raise InvalidArgumentError("body", f"one pushed along x for {what}", got)
 
 
 def _checked_springs(value: object, positions: Array) -> npt.NDArray[np.int64]:
@@ -191,8 +208,7 @@ def _check_connected(springs: npt.NDArray[np.int64], n: int) -> None:
 def _checked_fixed(value: object, positions: Array) -> npt.NDArray[np.bool_]:
     n = len(positions)
     if value is None:
-        array = np.zeros(n, dtype=np.bool_)
-        array[[positions[:, 0].argmin(), positions[:, 0].argmax()]] = True
+        array = held_nodes(positions)
     else:
         array = np.asarray(value)
         if array.dtype != np.bool_ or array.shape != (n,):

@@ -1,6 +1,8 @@
-"""Random bodies as in the paper: uniform points, Delaunay springs, log-uniform parameters."""
+"""Random bodies as in the paper, or in space: uniform points, Delaunay springs, log-uniform
+parameters."""
 
 from dataclasses import dataclass
+from itertools import combinations
 from typing import Any
 
 import numpy as np
@@ -8,11 +10,18 @@ import numpy.typing as npt
 from scipy.spatial import Delaunay, QhullError
 
 from mcmj.core.body import Body
+from mcmj.core.space import held_nodes
 from mcmj.utils.errors import InvalidArgumentError, UnknownNameError
 from mcmj.utils.seeds import stream
 from mcmj.utils.validation import Array, as_array, require_count, require_number, require_range
 
 Range = tuple[float, float]
+# by dimensions: the fewest points, what they must span, and do not, and Qhull's options: SciPy's
+# own in the plane; in space without Qz, which adds a point at infinity, and so takes five
+SIMPLICES: dict[int, tuple[int, str, str, str | None]] = {
+    2: (3, "plane", "collinear", None),
+    3: (5, "space", "coplanar", "Qbb Qc Q12"),
+}
 MOST_NODES, MOST_CHANNELS = 100_000, 1000  # more would fill the memory before anything runs
 
 
@@ -27,6 +36,7 @@ class BodySettings:
         nodes: number of masses N.
         width: of the area of the nodes [m].
         height: of the area of the nodes [m].
+        depth: of the box of the nodes [m]; 0: a planar body.
         k1: (low, high) of the log-uniform linear stiffnesses [N/m].
         k3: (low, high) of the log-uniform cubic stiffnesses [N/m^3]; 0 0: linear springs.
         d1: (low, high) of the log-uniform linear dampings [N s/m].
@@ -46,6 +56,7 @@ class BodySettings:
     nodes: int = 25
     width: float = 100.0
     height: float = 100.0
+    depth: float = 0.0
     k1: Range = (1.0, 10.0)
     k3: Range = (100.0, 200.0)
     d1: Range = (0.3, 6.0)
@@ -59,7 +70,8 @@ class BodySettings:
     feedback_scale: float = 10.0
 
     def __post_init__(self) -> None:
-        require_count("nodes", self.nodes, 3, MOST_NODES)
+        require_number("depth", self.depth, 0.0)
+        require_count("nodes", self.nodes, SIMPLICES[3 if self.depth else 2][0], MOST_NODES)
         require_count("n_inputs", self.n_inputs, 0, MOST_CHANNELS)
         require_count("n_outputs", self.n_outputs, 0, MOST_CHANNELS)
         for name in ("width", "height", "input_scale", "feedback_scale"):
@@ -77,7 +89,9 @@ def random_body(seed: int, nodes: int = 25, **settings: Any) -> Body:
     """Draw a random body (Hauser et al. 2012, section 4).
 
     Nodes are uniform in the area, springs are the edges of their Delaunay triangulation, rest
-    lengths the distances at the start; the leftmost and the rightmost node are fixed. Every
+    lengths the distances at the start; the leftmost and the rightmost node are fixed. With a
+    `depth` they fill a box: the springs are the edges of Delaunay's tetrahedra, and a third node
+    is fixed, see `mcmj.core.space.held_nodes`. Every
     quantity has its own random stream: changing one range leaves all else alone, and adding a
     channel leaves the earlier channels alone.
 
@@ -98,11 +112,12 @@ def random_body(seed: int, nodes: int = 25, **settings: Any) -> Body:
 
 def draw_body(seed: int, settings: BodySettings) -> Body:
     """`random_body` from a settings object."""
-    n, size = settings.nodes, (settings.width, settings.height)
-    positions = stream(seed, "topology").uniform((0.0, 0.0), size, (n, 2))
+    n, size = settings.nodes, [settings.width, settings.height]
+    if settings.depth:
+        size.append(settings.depth)
+    positions = stream(seed, "topology").uniform(np.zeros(len(size)), size, (n, len(size)))
     springs = delaunay_springs(positions)
-    fixed = np.zeros(n, dtype=np.bool_)
-    fixed[[positions[:, 0].argmin(), positions[:, 0].argmax()]] = True
+    fixed = held_nodes(positions)
     free = np.flatnonzero(~fixed)
     parameters = {
         name: log_uniform(stream(seed, name), getattr(settings, name), len(springs))
@@ -132,22 +147,29 @@ def draw_body(seed: int, settings: BodySettings) -> Body:
 
 
 def delaunay_springs(positions: npt.ArrayLike) -> npt.NDArray[np.int64]:
-    """Edges (L, 2) of the Delaunay triangulation of (N, 2) points, each once, sorted.
+    """Edges (L, 2) of the Delaunay triangulation of (N, D) points, each once, sorted.
 
     Raises:
-        InvalidArgumentError: fewer than 3 points, or all on one line.
+        InvalidArgumentError: fewer than 3 points in the plane or 5 in space, or all on one line
+            or plane.
     """
-    points = as_array("positions", positions, (None, 2))
-    if len(points) < 3:
-        raise InvalidArgumentError("positions", "at least 3 points", len(points))
+    points = as_array("positions", positions, (None, None))
+    dimensions = points.shape[1]
+    if dimensions not in SIMPLICES:
+        raise InvalidArgumentError("positions", "points (N, 2) or (N, 3)", points.shape)
+    least, kind, flat, options = SIMPLICES[dimensions]
+    if len(points) < least:
+        raise InvalidArgumentError("positions", f"at least {least} points", len(points))
     try:
-        triangles = Delaunay(points).simplices
+        corners = Delaunay(points, qhull_options=options).simplices
     except QhullError as error:
         raise InvalidArgumentError(
-            "positions", "points that span a plane", f"{len(points)} collinear points"
+            "positions", f"points that span a {kind}", f"{len(points)} {flat} points"
         ) from error
-    edges = np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]])
-    return np.unique(np.sort(edges, axis=1), axis=0).astype(np.int64)
+    edges = np.concatenate([corners[:, pair] for pair in combinations(range(dimensions + 1), 2)])
+    found = np.unique(np.sort(edges, axis=1), axis=0).astype(np.int64)
+    assert found.max() < len(points)
+    return found
 
 
 def log_uniform(rng: np.random.Generator, bounds: Range, size: int) -> Array:

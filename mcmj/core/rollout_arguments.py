@@ -41,9 +41,9 @@ class Drive:
         inputs: (..., T, n_inputs).
         offset: (..., T, n_outputs), added to the fed-back outputs.
         gate: (n_outputs,): 1 closes a feedback channel, 0 opens it.
-        forces: (..., T, n_forces) horizontal forces on a body's nodes [N], or what acts on the
-            degrees of freedom of a model [N or N m]; T = 1 if constant.
-        pushes: (n_bodies, 6) constant forces [N] and torques [N m] on a model's bodies.
+        forces: (..., T, n_forces) forces on a body's nodes along its direction [N], or what acts
+            on the degrees of freedom of a model [N or N m]; T = 1 if constant.
+        pushes: (copies, n_bodies, 6) constant forces [N] and torques [N m] on a model's bodies.
     """
 
     steps: int

@@ -1,7 +1,8 @@
 """What a rollout returns, whichever engine ran it."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
@@ -20,12 +21,12 @@ class State:
     """Where the nodes are and how fast they move; what an engine needs to go on.
 
     Attributes:
-        positions, velocities: (N, 2) [m], [m/s].
+        positions, velocities: (N, D) [m], [m/s], D = 2 or 3.
         time: [s].
         previous_lengths: (L,) spring lengths one step earlier [m] (toolbox scheme only).
         pending_output: (n_outputs,) output still to be fed back (toolbox scheme only).
-        history: (N, 7), the compiled leapfrog only: `velocities` again, the velocities that
-            dampers see next and those half a step back [m/s], the last push [N]. Whoever
+        history: (N, 3 D + 1), the reference's leapfrog only: `velocities` again, the velocities
+            that dampers see next and those half a step back [m/s], the last push [N]. Whoever
             changes `velocities` makes it void: the scheme then starts anew from them.
     """
 
@@ -49,7 +50,7 @@ class Trajectory:
         times: (T,) [s].
         lengths: (T, L) spring lengths [m]; of any other model the signals (T, n_signals).
         outputs: (T, n_outputs), zeros without a readout.
-        positions, velocities: (T, N, 2) [m], [m/s].
+        positions, velocities: (T, N, D) [m], [m/s].
         qpos, qvel: (T, nq), (T, nv) of a model that is no Body.
         sensordata: (T, nsensordata) all sensors of such a model, as MuJoCo computed them in step k.
         final_state: state after the last step.
@@ -67,6 +68,16 @@ class Trajectory:
 
     def __len__(self) -> int:
         return len(self.times)
+
+    def thinned(self, every: int) -> "Trajectory":
+        """The first of every so many samples."""
+        rows = np.arange(0, len(self), every)
+        kept: dict[str, Any] = {
+            name: np.take(getattr(self, name), rows, axis)
+            for name, axis in TIME_AXIS.items()
+            if getattr(self, name) is not None
+        }
+        return replace(self, times=self.times[rows], **kept)
 
     @property
     def signals(self) -> Array | None:

@@ -1,7 +1,9 @@
 """What is to be taught, and how: lessons of teacher forcing; mcmj.learning.teaching gives them."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+
+import numpy as np
 
 from mcmj.simulation.reservoir import Reservoir
 from mcmj.utils.errors import InvalidArgumentError
@@ -79,6 +81,7 @@ class Lesson:
         weight: of the squared errors, a number or times (T,) [s] -> (T,).
         from_rest: begin at total rest and time 0, and leave the simulation as it was.
         start: begin at this snapshot of the simulation, and leave it as it was.
+        noise_share: of the teaching's noise, a number or one for each output.
         own_share: s in [0, 1]: s y + (1 - s) y* + noise is fed back, y the body's own outputs.
     """
 
@@ -89,11 +92,14 @@ class Lesson:
     weight: float | Signal = 1.0
     from_rest: bool = False
     start: Array | None = None
+    noise_share: float | Sequence[float] = 1.0
     own_share: float = 0.0
 
     def __post_init__(self) -> None:
         require_number("duration", self.duration, 0.0, open_low=True)
         require_washout(self.washout, self.duration)
+        for share in np.atleast_1d(self.noise_share).tolist():
+            require_number("noise_share", share, 0.0)
         require_number("own_share", self.own_share, 0.0, 1.0)
         if self.from_rest and self.start is not None:
             raise InvalidArgumentError("start", "None for a lesson from rest", "a snapshot")

@@ -1,40 +1,45 @@
-"""Ridge regression, one sample at a time: recursive least squares.
+"""From a regression of all samples so far to recursive least squares that goes on from there.
 
-    g = P f,   W <- W + g (y - W^T f)^T / (1 + f^T g),   P <- P - g g^T / (1 + f^T g)
+Signals are taken from their mean and over their standard deviation, so that one ridge means the
+same in any units; the constant is not penalised. For features F = [(s - m) / d, 1] of n samples:
 
-from P = 1 / ridge and W = 0. After n samples W minimises sum_i |y_i - W^T f_i|^2 + ridge |W|^2,
-as a batch would (Haykin, Adaptive Filter Theory, chapter on recursive least squares).
+    P = (F^T F + ridge I')^(-1) = R R^T,   W = P F^T Y        (I' without the constant)
+
+Nothing is squared: F and Y are the triangular factor of the regression, and R its SVD's V / s.
 """
 
 import numpy as np
+from scipy.linalg import svd
 
-from mcmj.utils.validation import Array, require_count, require_number
+from mcmj.core.callbacks.online_learning import Learner
+from mcmj.learning.regression import Regression
+from mcmj.utils.validation import require_number
+
+STILL = 1e-9  # standard deviation, over the mean, of a signal that says nothing
 
 
-class RecursiveLeastSquares:
-    """A linear map that is right about every sample as it comes.
+def learner_after(regression: Regression, ridge: float) -> Learner:
+    """What a readout that is corrected sample by sample begins with.
 
     Args:
-        n_features: number of f.
-        n_outputs: number of y.
-        ridge: penalty of the squared weights, > 0, in squared units of f.
+        regression: with a bias, of samples with weight 1.
+        ridge: penalty of the squared weights, > 0; signals have variance 1.
 
     Raises:
-        InvalidArgumentError: an argument out of bounds.
+        InvalidArgumentError: no samples, or a ridge that is not positive.
     """
-
-    def __init__(self, n_features: int, n_outputs: int, *, ridge: float) -> None:
-        require_count("n_features", n_features, 1)
-        require_count("n_outputs", n_outputs, 1)
-        require_number("ridge", ridge, 0.0, open_low=True)
-        self._inverse = np.eye(n_features) / ridge
-        self.weights = np.zeros((n_features, n_outputs))
-
-    def update(self, features: Array, wanted: Array) -> Array:
-        """Learn one sample, f (n_features,) and y (n_outputs,); returns the error it came with."""
-        gain = self._inverse @ features
-        share = 1.0 + features @ gain
-        error = self.weights.T @ features - wanted
-        self.weights = self.weights - np.outer(gain / share, error)
-        self._inverse -= np.outer(gain / share, gain)
-        return error
+    require_number("ridge", ridge, 0.0, open_low=True)
+    factor, wanted = regression.factors
+    n, rows = regression.n_lengths, regression.weight
+    constant = factor[:, n]
+    mean = factor[:, :n].T @ constant / rows
+    apart = factor[:, :n] - np.outer(constant, mean)
+    spread = np.linalg.norm(apart, axis=0) / np.sqrt(rows)
+    moves = spread > STILL * np.abs(mean)
+    inverse = np.divide(1.0, spread, out=np.zeros(n), where=moves)
+    penalty = np.sqrt(ridge) * np.eye(n, n + 1)
+    features = np.vstack([np.column_stack([apart * inverse, constant]), penalty])
+    goal = np.vstack([wanted, np.zeros((n, wanted.shape[1]))])
+    u, values, vt = svd(features, full_matrices=False)
+    root = np.ascontiguousarray(vt.T / values)
+    return Learner(root, np.ascontiguousarray((root @ (u.T @ goal)).T), mean, inverse)

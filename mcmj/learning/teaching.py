@@ -112,8 +112,13 @@ class Course:
 
         Raises:
             DivergenceError: the body blew up; nothing of the lesson is then folded in.
-            InvalidArgumentError: a share of its own outputs for a body that has no readout.
+            InvalidArgumentError: a share of its own outputs for a body that has no readout, or
+                shares of the noise for other than its outputs.
         """
+        if np.size(lesson.noise_share) not in (1, self.simulation.n_outputs):
+            raise InvalidArgumentError(
+                "noise_share", f"1 or {self.simulation.n_outputs} numbers", lesson.noise_share
+            )
         if lesson.own_share > 0 and self.simulation.w_out is None:
             raise InvalidArgumentError("own_share", "0 before the first fit", lesson.own_share)
         before = self.simulation.snapshot()
@@ -146,7 +151,10 @@ class Course:
         """Lengths (T, L) under the teacher, as the readout sees them."""
         noise = self._rest_noise if lesson.elsewhere else self._noise
         noisy = (1.0 - lesson.own_share) * clean
-        noisy += self._teaching.noise * noise.standard_normal(clean.shape)
+        share = np.broadcast_to(lesson.noise_share, clean.shape[1])
+        loud = share > 0  # only these draw from the stream
+        drawn = noise.standard_normal((len(clean), loud.sum()))
+        noisy[:, loud] += self._teaching.noise * share[loud] * drawn
         run = self.simulation.rollout(
             inputs=None if lesson.inputs is None else lesson.inputs(times),
             offset=noisy,

@@ -15,6 +15,7 @@ from mcmj.utils.colours import (
 )
 
 CAMERA_ANGLE = 30.0  # degrees; narrow: nodes far out are seen from above too
+OBLIQUE = 60.0, -25.0  # azimuth and elevation [degrees] of the view of a body in space
 NODE_SHARE, SPRING_SHARE = 0.014, 0.003  # radii, of the view
 MARGIN = 0.12  # of the body's larger side, around it
 
@@ -42,8 +43,9 @@ def node_kinds(body: Body) -> dict[str, Colour]:
 
 
 def frame(body: Body) -> tuple[float, float, float, float]:
-    """Centre x, centre y, width and height [m] of the view that shows the whole body."""
-    low, high = body.positions.min(axis=0), body.positions.max(axis=0)
+    """Centre x, centre y, width and height [m] of the view along z that shows the whole body."""
+    flat = body.positions[:, :2]
+    low, high = flat.min(axis=0), flat.max(axis=0)
     margin = MARGIN * (high - low).max()
     (cx, cy), (width, height) = (low + high) / 2, high - low + 2 * margin
     return float(cx), float(cy), float(width), float(height)
@@ -63,9 +65,12 @@ def add_appearance(root: ET.Element, body: Body) -> None:
     cx, cy, width, height = frame(body)
     extent = max(width, height)
     distance = extent / 2 / np.tan(np.radians(CAMERA_ANGLE / 2))
-    ET.SubElement(root, "statistic", center=f"{cx:g} {cy:g} 0", extent=f"{extent:g}")
+    cz, upper = _heights(body)
+    ET.SubElement(root, "statistic", center=f"{cx:g} {cy:g} {cz:g}", extent=f"{extent:g}")
     visual = ET.SubElement(root, "visual")
-    ET.SubElement(visual, "global", azimuth="90", elevation="-90", fovy=f"{CAMERA_ANGLE:g}")
+    azimuth, elevation = ("90", "-90") if body.dimensions == 2 else map("{:g}".format, OBLIQUE)
+    angle = f"{CAMERA_ANGLE:g}"
+    ET.SubElement(visual, "global", azimuth=azimuth, elevation=elevation, fovy=angle)
     ET.SubElement(visual, "headlight", ambient=".7 .7 .7", diffuse=".3 .3 .3", specular="0 0 0")
     ET.SubElement(visual, "quality", shadowsize="0", offsamples="0", numslices="12", numstacks="6")
     ET.SubElement(
@@ -81,6 +86,40 @@ def add_appearance(root: ET.Element, body: Body) -> None:
         world,
         "camera",
         name="top",
-        pos=f"{cx:.9g} {cy:.9g} {distance:.9g}",
+        pos=f"{cx:.9g} {cy:.9g} {upper + distance:.9g}",
+        fovy=angle,
+    )
+    if body.dimensions == 3:
+        _add_oblique_camera(world, body)
+
+
+def camera_of(body: Body) -> str:
+    """Name of the camera that shows a body best: from above, or of one in space obliquely."""
+    return "top" if body.dimensions == 2 else "oblique"
+
+
+def _heights(body: Body) -> tuple[float, float]:
+    """z of the body's middle and of its upper end [m]."""
+    if body.dimensions == 2:
+        return 0.0, 0.0
+    z = body.positions[:, 2]
+    return float(z.min() + z.max()) / 2, float(z.max())
+
+
+def _add_oblique_camera(world: ET.Element, body: Body) -> None:
+    """A camera in the direction OBLIQUE, so far away that it sees the ball around the body."""
+    low, high = body.positions.min(axis=0), body.positions.max(axis=0)
+    centre = (low + high) / 2
+    radius = (1.0 + MARGIN) * np.linalg.norm(body.positions - centre, axis=1).max()
+    azimuth, elevation = np.radians(OBLIQUE)
+    ahead = np.array([np.cos(azimuth), np.sin(azimuth), np.tan(elevation)]) * np.cos(elevation)
+    right = np.array([np.sin(azimuth), -np.cos(azimuth), 0.0])
+    place = centre - radius / np.sin(np.radians(CAMERA_ANGLE / 2)) * ahead
+    ET.SubElement(
+        world,
+        "camera",
+        name="oblique",
+        pos=" ".join(f"{c:.9g}" for c in place),
+        xyaxes=" ".join(f"{c:.9g}" for c in [*right, *np.cross(right, ahead)]),
         fovy=f"{CAMERA_ANGLE:g}",
     )

@@ -96,12 +96,13 @@ def body_of_model(model: mujoco.MjModel) -> Body:
         masses[fixed] = _shaped(stored, (int(fixed.sum()),), "fixed_masses")
     try:
         body = Body(
-            positions=positions[:, :2],
+            positions=positions[:, : _dimensions(model, fixed)],
             springs=_spring_ends(model, springs, nodes),
             fixed=fixed,
             masses=masses,
             w_in=_weights(model, "in", fixed),
             w_fb=_weights(model, "fb", fixed),
+            direction=_stored(model, "direction"),  # type: ignore[arg-type]  # None: x
             **_spring_parameters(model, springs),
         )
     except InvalidArgumentError as error:
@@ -268,14 +269,28 @@ def _spring_parameters(model: mujoco.MjModel, springs: np.ndarray) -> dict[str, 
     }
 
 
+def _dimensions(model: mujoco.MjModel, fixed: np.ndarray) -> int:
+    """3 if the free nodes have joints along z."""
+    free = np.flatnonzero(~fixed)
+    name = f"n{free[0]}z" if free.size else "none"
+    return 3 if mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_JOINT, name) >= 0 else 2
+
+
 def _weights(model: mujoco.MjModel, prefix: str, fixed: np.ndarray) -> Array:
-    """Weights (N, channels) from the joint coefficients of the channels' fixed tendons."""
+    """Weights (N, channels) from the joint coefficients of the channels' fixed tendons.
+
+    Of a body pushed along another direction than x, coefficients are products: its weights are
+    stored beside them, and what is compiled of them must be the model (`require_same_physics`).
+    """
     channels = _ids(model, mujoco.mjtObj.mjOBJ_TENDON, prefix, model.ntendon)
     driven = _ids(model, mujoco.mjtObj.mjOBJ_ACTUATOR, prefix, model.nu)
     if len(driven) != len(channels):
         raise BodyFileError(
             f"{len(channels)} tendons {prefix}0, {prefix}1, .. but {len(driven)} such actuators"
         )
+    whole = _stored(model, f"w_{prefix}")
+    if whole is not None:
+        return _shaped(whole, (len(fixed), len(channels)), f"w_{prefix}")
     weights = np.zeros((len(fixed), len(channels)))
     for c, tendon in enumerate(channels):
         for wrap in range(
@@ -283,7 +298,7 @@ def _weights(model: mujoco.MjModel, prefix: str, fixed: np.ndarray) -> Array:
         ):
             joint = _JOINT.fullmatch(model.joint(model.wrap_objid[wrap]).name)
             if model.wrap_type[wrap] != mujoco.mjtWrap.mjWRAP_JOINT or joint is None:
-                raise BodyFileError(f"tendon {prefix}{c} does not push nodes horizontally")
+                raise BodyFileError(f"tendon {prefix}{c} does not push nodes along x")
             if int(joint[1]) >= len(fixed):
                 raise BodyFileError(f"tendon {prefix}{c} pushes a node that is not there")
             weights[int(joint[1]), c] = model.wrap_prm[wrap]

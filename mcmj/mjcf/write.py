@@ -1,6 +1,7 @@
 """Body -> MJCF. A body file is a complete program: geometry, springs, weights, readout.
 
-Names in the file: body, joints and site of node i are n<i>, n<i>x, n<i>y and n<i>; spring j
+Names in the file: body, joints and site of node i are n<i>, n<i>x, n<i>y (and n<i>z, of a body
+in space) and n<i>; spring j
 is the spatial tendon s<j> with the length sensor length<j>; input and feedback channel c are
 the actuators in<c> and fb<c> on fixed tendons of the same names. Fixed nodes are sites of
 the world: they have no joints. Numbers are written with 17 digits, so reading gives back
@@ -20,11 +21,13 @@ from mcmj.core.callbacks.pointers import TAG
 from mcmj.core.callbacks.spring_laws import SpringLaw, spring_law
 from mcmj.core.integrators import DEFAULT_INTEGRATOR, Integrator, integrator_named
 from mcmj.core.readout import checked_readout
+from mcmj.core.space import AXES
 from mcmj.mjcf.appearance import add_appearance, node_style
 from mcmj.utils.errors import InvalidArgumentError
 from mcmj.utils.validation import Array, require_number
 
 READOUT_PREFIX = "readout/"
+JOINTS = tuple(zip(AXES, ("1 0 0", "0 1 0", "0 0 1"), strict=True))
 
 
 def to_mjcf(
@@ -100,7 +103,7 @@ def _add_options(root: ET.Element, body: Body, timestep: float, scheme: Integrat
         integrator=scheme.mujoco_name,
     )
     if scheme.by_callback:
-        ET.SubElement(root, "size", nuserdata=str(userdata_size(2 * len(body.free))))
+        ET.SubElement(root, "size", nuserdata=str(userdata_size(body.dimensions * len(body.free))))
     # no contacts, limits or equalities: skip the whole constraint machinery; and keep a state
     # that blew up for the error message instead of resetting it silently
     ET.SubElement(option, "flag", constraint="disable", contact="disable", autoreset="disable")
@@ -118,11 +121,14 @@ def _add_custom(
     custom = ET.Element("custom")  # as text: a numeric takes 500 numbers at most
     if scheme.by_callback:
         ET.SubElement(custom, "numeric", name=scheme.name, data=numbers(TAG))
-    extras = {"fixed_masses": body.masses, "fixed_w_in": body.w_in, "fixed_w_fb": body.w_fb}
-    for name, array in extras.items():
-        values = array[body.fixed]
-        if values.size and (values != (1.0 if name == "fixed_masses" else 0.0)).any():
-            ET.SubElement(custom, "text", name=name, data=numbers(values))
+    for name in ("masses", "w_in", "w_fb"):
+        values = getattr(body, name)[body.fixed]
+        if values.size and (values != (1.0 if name == "masses" else 0.0)).any():
+            ET.SubElement(custom, "text", name=f"fixed_{name}", data=numbers(values))
+    if not body.pushed_along_x:  # coefficients of joints are products, rounded
+        for name in ("direction", "w_in", "w_fb"):
+            if getattr(body, name).size:
+                ET.SubElement(custom, "text", name=name, data=numbers(getattr(body, name)))
     for name, readout in readouts.items():
         ET.SubElement(custom, "text", name=READOUT_PREFIX + name, data=numbers(readout))
     if law is not None:
@@ -137,7 +143,7 @@ def _add_nodes(root: ET.Element, body: Body) -> None:
     world = root.find("worldbody")
     assert world is not None
     for i, position in enumerate(body.positions):
-        place = {"name": f"n{i}", "pos": numbers([*position, 0.0])}
+        place = {"name": f"n{i}", "pos": numbers([*position, 0.0][:3])}
         if body.fixed[i]:
             ET.SubElement(world, "site", place | node_style(body, i))
             continue
@@ -146,8 +152,8 @@ def _add_nodes(root: ET.Element, body: Body) -> None:
         ET.SubElement(
             node, "inertial", pos="0 0 0", mass=numbers(body.masses[i]), diaginertia="1 1 1"
         )
-        ET.SubElement(node, "joint", name=f"n{i}x", type="slide", axis="1 0 0")
-        ET.SubElement(node, "joint", name=f"n{i}y", type="slide", axis="0 1 0")
+        for name, axis in JOINTS[: body.dimensions]:
+            ET.SubElement(node, "joint", name=f"n{i}{name}", type="slide", axis=axis)
         ET.SubElement(node, "site", node_style(body, i), name=f"n{i}")
 
 
@@ -188,11 +194,20 @@ def _add_channels(
 
 
 def _add_push(tendons: ET.Element, name: str, body: Body, weights: Array) -> None:
-    """A fixed tendon whose unit force is the channel's weight on every free node."""
+    """A fixed tendon whose unit force is the channel's weight times `direction` on free nodes."""
     fixed = ET.SubElement(tendons, "fixed", name=name)
     pushed = [i for i in body.free if weights[i] != 0.0] or [body.free[0]]
     for i in pushed:
-        ET.SubElement(fixed, "joint", joint=f"n{i}x", coef=numbers(weights[i]))
+        for axis, share in zip(AXES, body.direction, strict=False):
+            if share != 0.0:
+                coef = weights[i] if share == 1.0 else _product(weights[i], share)
+                ET.SubElement(fixed, "joint", joint=f"n{i}{axis}", coef=numbers(coef))
+
+
+def _product(weight: float, share: float) -> float:
+    """0 where it would be subnormal, which MuJoCo does not read."""
+    product = weight * share
+    return product if abs(product) >= np.finfo(float).tiny else 0.0
 
 
 def _add_sensors(

@@ -13,7 +13,7 @@ from matplotlib.lines import Line2D
 from PIL import Image
 
 from mcmj.mjcf.appearance import node_kinds
-from mcmj.pictures.film import Film
+from mcmj.pictures.film import Film, Recording
 from mcmj.utils.colours import (
     BLACK,
     CHANGE_COLOUR,
@@ -39,22 +39,21 @@ class FilmFigure:
         panel: width of the axes beside them [pixels].
     """
 
-    def __init__(self, film: Film, pace: str, width: int, height: int, panel: int) -> None:
+    def __init__(self, film: Recording, pace: str, width: int, height: int, panel: int) -> None:
         self._film, self._width, self._drawn = film, width, 0
         self._figure = Figure(figsize=((width + panel) / DPI, height / DPI), dpi=DPI)
         self._canvas = FigureCanvasAgg(self._figure)
         share = width / (width + panel)
         words = self._figure.add_axes((0.0, 0.0, share, 1.0))
-        _draw_legends(words, film)
+        words.set_axis_off()
+        if isinstance(film, Film):
+            _draw_legends(words, film)
         words.text(0.015, 0.015, "t =", fontsize=LARGE)
         self._time = words.text(0.06, 0.015, "", fontsize=LARGE, animated=True)
         self._label = words.text(
             0.5, 0.98, "", fontsize=LARGE, animated=True, color=CHANGE_COLOUR, ha="center", va="top"
         )
-        scales = f"{pace}, deformation x {film.scale:g}"
-        if film.largest_force > 0.0:
-            scales += f", longest arrow {film.largest_force:.2g} N"
-        words.text(0.17, 0.015, scales, fontsize=LARGE)
+        words.text(0.17, 0.015, pace + film.scales, fontsize=LARGE)
         grid = self._figure.add_gridspec(
             2, 1, left=share + 0.055, right=0.985, bottom=0.1, top=0.94, hspace=0.42,
             height_ratios=(1.9, 1.0),
@@ -97,7 +96,7 @@ class FilmFigure:
 class _Plane:
     """The first two outputs against each other."""
 
-    def __init__(self, axes: Axes, film: Film) -> None:
+    def __init__(self, axes: Axes, film: Recording) -> None:
         self._axes, self._times, self._outputs = axes, film.times, film.outputs[:, :2]
         shown = self._outputs
         if film.orbit is not None:
@@ -130,7 +129,7 @@ class _Plane:
 class _Traces:
     """All outputs over time."""
 
-    def __init__(self, axes: Axes, film: Film) -> None:
+    def __init__(self, axes: Axes, film: Recording) -> None:
         self._axes, self._times, self._outputs = axes, film.times, film.outputs
         for window in film.windows:
             axes.axvspan(window.start, window.end, color=CHANGE_COLOUR, alpha=0.15, lw=0)
@@ -164,7 +163,6 @@ def _label_axes(axes: Axes, x: str, y: str) -> None:
 
 def _draw_legends(axes: Axes, film: Film) -> None:
     """Who is who at the left, what the springs' colours mean at the right."""
-    axes.set_axis_off()
     nodes = [
         Line2D([], [], ls="", marker="s" if name == "fixed" else "o", color=colour, label=name)
         for name, colour in node_kinds(film.body).items()

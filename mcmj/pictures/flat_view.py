@@ -1,4 +1,7 @@
-"""The same pictures as opengl_view by matplotlib alone: slower, but no driver can be missing."""
+"""The same pictures as opengl_view by matplotlib alone: slower, but no driver can be missing.
+
+Bodies in space are seen along z.
+"""
 
 import numpy as np
 import numpy.typing as npt
@@ -33,7 +36,7 @@ class FlatView:
             for nodes, marker in ((np.flatnonzero(body.fixed), "s"), (body.free, "o"))
         ]
         self._arrows = axes.quiver(
-            *body.positions.T, *np.zeros((2, body.n_nodes)), color=ARROW_COLOUR, zorder=3,
+            *body.positions[:, :2].T, *np.zeros((2, body.n_nodes)), color=ARROW_COLOUR, zorder=3,
             angles="xy", scale_units="xy", scale=1.0, width=0.005, minlength=0.0,
         )  # fmt: skip
 
@@ -44,13 +47,14 @@ class FlatView:
         pass
 
     def draw(self, positions: Array, colours: Array, arrows: Array) -> Picture:
-        """A picture (height, width, 3) of positions (N, 2), colours (L, 3) and arrows (N,)."""
+        """A picture (height, width, 3) of positions (N, D), colours (L, 3) and arrows (N,)."""
+        positions, (x, y) = positions[:, :2], self._body.direction[:2]
         self._springs.set_segments(list(positions[self._body.springs]))
         self._springs.set_color(list(colours))
         for nodes, markers in self._groups:
             markers.set_offsets(positions[nodes])
         self._arrows.set_offsets(positions)
-        self._arrows.set_UVC(arrows, np.zeros_like(arrows))
+        self._arrows.set_UVC(x * arrows, y * arrows)
         self._figure.canvas.draw()
         pixels = np.array(self._figure.canvas.buffer_rgba())  # type: ignore[attr-defined]  # Agg's
         return pixels[..., :3]
@@ -74,5 +78,5 @@ def _markers(
     axes: Axes, body: Body, nodes: npt.NDArray[np.int64], marker: str, area: float
 ) -> PathCollection:
     colours = [node_colour(body, int(node)) for node in nodes]
-    x, y = body.positions[nodes].T
+    x, y = body.positions[nodes, :2].T
     return axes.scatter(x, y, s=area, c=colours, marker=marker, linewidths=0, zorder=2)

@@ -7,7 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 from mcmj.core.body import Body
-from mcmj.mjcf.appearance import frame
+from mcmj.mjcf.appearance import camera_of, frame
 from mcmj.mjcf.read import load_model
 from mcmj.mjcf.write import to_mjcf
 from mcmj.pictures.opengl import new_renderer
@@ -52,15 +52,15 @@ class GLView:
         """A picture (height, width, 3).
 
         Args:
-            positions: (N, 2) of the nodes as drawn [m].
+            positions: (N, D) of the nodes as drawn [m].
             colours: (L, 3) of the springs.
-            arrows: (N,) lengths of horizontal arrows at the nodes [m].
+            arrows: (N,) lengths of arrows at the nodes, along the body's direction [m].
         """
         model, data, body = self._model, self._data, self._body
         data.qpos[:] = (positions - body.positions)[body.free].ravel()
         model.tendon_rgba[: body.n_springs, :3] = colours
         mujoco.mj_fwdPosition(model, data)
-        self._renderer.update_scene(data, camera="top")
+        self._renderer.update_scene(data, camera=camera_of(body))
         for node in np.flatnonzero(np.abs(arrows) > 0.01 * self._extent):
             self._add_arrow(positions[node], float(arrows[node]))
         picture: Picture = self._renderer.render()
@@ -70,7 +70,7 @@ class GLView:
         return picture
 
     def _add_arrow(self, start: Array, length: float) -> None:
-        scene, height = self._renderer.scene, 0.03 * self._extent  # above nodes and springs
+        scene, body = self._renderer.scene, self._body
         if scene.ngeom >= scene.maxgeom:
             return
         geom = scene.geoms[scene.ngeom]
@@ -79,6 +79,7 @@ class GLView:
         colour = np.array([*ARROW_COLOUR, 1.0], dtype=np.float32)
         mujoco.mjv_initGeom(geom, kind, np.zeros(3), np.zeros(3), np.eye(3).ravel(), colour)
         # MuJoCo draws an arrow half as long as it says
-        tip = np.array([start[0] + 2.0 * length, start[1], height])
-        origin = np.array([start[0], start[1], height])
-        mujoco.mjv_connector(geom, kind, ARROW_WIDTH * self._extent, origin, tip)
+        reach = 2.0 * length * body.direction
+        if body.dimensions == 2:  # above nodes and springs
+            start, reach = np.append(start, 0.03 * self._extent), np.append(reach, 0.0)
+        mujoco.mjv_connector(geom, kind, ARROW_WIDTH * self._extent, start, start + reach)

@@ -64,10 +64,14 @@ def save(figure: Figure, path: str | Path) -> None:
 
 
 def plot_body(axes: Axes, body: Body) -> None:
-    """The network: springs, and nodes in the colours of their roles, with a legend."""
-    lines = body.positions[body.springs]
+    """The network: springs, and nodes in the colours of their roles, with a legend.
+
+    A body in space is seen along z.
+    """
+    flat = body.positions[:, :2]
+    lines = flat[body.springs]
     axes.add_collection(LineCollection(list(lines), colors="0.6", linewidths=1.0))
-    for node, (x, y) in enumerate(body.positions):
+    for node, (x, y) in enumerate(flat):
         marker = "s" if body.fixed[node] else "o"
         axes.plot(x, y, marker, color=node_colour(body, node), ms=7, mec="black", mew=0.5)
     roles = [("fixed", FIXED_COLOUR, "s"), ("input", INPUT_COLOUR, "o")][

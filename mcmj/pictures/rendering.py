@@ -5,7 +5,7 @@ so that they never depend on a driver.
 """
 
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import AbstractContextManager, ExitStack, contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -16,9 +16,10 @@ import numpy as np
 from PIL import Image
 
 from mcmj.core.body import Body
-from mcmj.pictures.film import Film
+from mcmj.pictures.film import Film, ModelFilm
 from mcmj.pictures.film_figure import FilmFigure
 from mcmj.pictures.flat_view import FlatView
+from mcmj.pictures.model_view import ModelView
 from mcmj.pictures.opengl import RenderingUnavailableError
 from mcmj.pictures.opengl_view import GLView
 from mcmj.pictures.video_file import Picture, new_video
@@ -120,18 +121,36 @@ def body_view(
         yield view
 
 
+@contextmanager
+def film_view(
+    film: Film | ModelFilm, style: Style, report: Report
+) -> Iterator[Callable[[int], Picture]]:
+    """A function that draws the picture of a sample, given its index.
+
+    Raises:
+        RenderingUnavailableError: there is no OpenGL, and matplotlib cannot do it.
+    """
+    if isinstance(film, ModelFilm):
+        with ModelView(film, WIDTH, HEIGHT, samples=style.samples) as model_view:
+            report.backend = model_view.backend
+            yield model_view.draw
+        return
+    with body_view(film.body, style, report=report) as view:
+        yield lambda index: view.draw(
+            film.drawn_positions(index), film.colours(index), film.arrows(index)
+        )
+
+
 def film_frames(
-    film: Film, style: Style | None = None, *, report: Report | None = None
+    film: Film | ModelFilm, style: Style | None = None, *, report: Report | None = None
 ) -> Iterator[Picture]:
-    """Frames (480, 1024, 3) of a film: the body at work, beside its outputs."""
+    """Frames (480, 1024, 3) of a film: the body or model at work, beside its outputs."""
     style, report = style or Style(), report or Report()
     figure = FilmFigure(film, style.pace, WIDTH, HEIGHT, PANEL_WIDTH)
-    with body_view(film.body, style, report=report) as view:
+    with film_view(film, style, report) as draw:
         for index in film.pick(style.fps, style.speed):
             start = time.perf_counter()
-            picture = view.draw(
-                film.drawn_positions(index), film.colours(index), film.arrows(index)
-            )
+            picture = draw(int(index))
             drawn = time.perf_counter()
             whole = figure.draw(picture, int(index))
             report.body_ms.append(1e3 * (drawn - start))
@@ -140,7 +159,8 @@ def film_frames(
 
 
 def write_film(
-    film: Film, paths: Mapping[str, Path], style: Style | None = None, *, stills: int = 0,
+    film: Film | ModelFilm, paths: Mapping[str, Path], style: Style | None = None, *,
+    stills: int = 0,
     on_frames: OnSteps = lambda frames: None,
 ) -> Report:  # fmt: skip
     """Write a film, each file whole or not at all.
@@ -197,7 +217,7 @@ def limit_cycle_video(
     """MP4 in real time: the body computing, beside its phase portrait drawing itself.
 
     Args:
-        times, positions, outputs: the same T control steps: (T,), (T, N, 2), (T, n_outputs).
+        times, positions, outputs: the same T control steps: (T,), (T, N, D), (T, n_outputs).
         seconds: length of the video, from the first sample on.
 
     Raises:

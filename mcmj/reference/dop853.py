@@ -25,18 +25,27 @@ EVALUATIONS_PER_SECOND = 1_000_000  # and this many more in a second
 ATOL_SHARE = 1e-3  # absolute tolerance, over the relative one, in units of 1 m and 1 m/s
 
 
-def accelerations(body: Body, positions: Array, velocities: Array, push: Array) -> Array:
-    """Right-hand side of Eqs. (6) and (7): (N, 2) [m/s^2] under horizontal forces push (N,) [N]."""
+def accelerations(
+    body: Body, positions: Array, velocities: Array, push: Array, rates: Array | None = None
+) -> Array:
+    """Right-hand side of Eqs. (6) and (7): (N, D) [m/s^2].
+
+    Args:
+        push: (N,) forces along the body's direction [N].
+        rates: (L,) of the springs [m/s], instead of those of the velocities.
+    """
     tail, head = body.springs.T
     gap, closing = positions[head] - positions[tail], velocities[head] - velocities[tail]
     length = np.linalg.norm(gap, axis=1)
     axis = gap / length[:, None]
-    x1, x2 = length - body.rest_lengths, (axis * closing).sum(axis=1)
+    x1, x2 = length - body.rest_lengths, (axis * closing).sum(axis=1) if rates is None else rates
     pull = body.k3 * x1**3 + body.k1 * x1 + body.d3 * x2**3 + body.d1 * x2
     force = np.zeros_like(positions)
     np.add.at(force, tail, pull[:, None] * axis)
     np.add.at(force, head, -pull[:, None] * axis)
-    force[:, 0] += push
+    for i, share in enumerate(body.direction):
+        if share:
+            force[:, i] += share * push
     return np.where(body.fixed[:, None], 0.0, force / body.masses[:, None])
 
 
@@ -52,14 +61,14 @@ def integrate_held(
     k, first_step = 0, None
     while k < drive.steps:
         lengths = spring_lengths(_split(body, state)[0], body.springs)
-        push = _held_push(body, drive, readout.outputs(lengths), k)
+        push = held_push(body, drive, readout.outputs(lengths), k)
         until = k + _same_until(body, drive, k)
         times = timestep * np.arange(until - k + 1, dtype=np.float64)
         try:
             states, first_step = _solve(body, _constant(push), state, times, rtol, first_step)
         except DivergenceError as error:
             raise _divergence(start.time + k * timestep, body, state).after(k) from error
-        positions = states[:-1, : 2 * body.n_nodes].reshape(-1, body.n_nodes, 2)
+        positions = states[:-1, : body.positions.size].reshape(-1, *body.positions.shape)
         recorded[k:until] = spring_lengths(positions, body.springs)
         state, k = states[-1], until
     return _trajectory(body, recorded, state, readout, timestep, start)
@@ -87,7 +96,7 @@ def integrate_continuous(
     state = np.concatenate([start.positions.ravel(), start.velocities.ravel()])
     times = start.time + timestep * np.arange(steps + 1, dtype=np.float64)
     states, _ = _solve(body, push, state, times, RTOL, None)
-    positions = states[:-1, : 2 * body.n_nodes].reshape(-1, body.n_nodes, 2)
+    positions = states[:-1, : body.positions.size].reshape(-1, *body.positions.shape)
     lengths = spring_lengths(positions, body.springs)
     return _trajectory(body, lengths, states[-1], readout, timestep, start)
 
@@ -97,12 +106,12 @@ def _constant(push: Array) -> Push:
 
 
 def _split(body: Body, state: Array) -> tuple[Array, Array]:
-    positions, velocities = state.reshape(2, body.n_nodes, 2)
+    positions, velocities = state.reshape(2, *body.positions.shape)
     return positions, velocities
 
 
-def _held_push(body: Body, drive: Drive, outputs: Array, k: int) -> Array:
-    """Horizontal force (N,) on every node during step k."""
+def held_push(body: Body, drive: Drive, outputs: Array, k: int) -> Array:
+    """Force (N,) [N] on every node, along the body's direction, during step k."""
     fed_back = drive.gate * outputs
     if drive.offset is not None:
         fed_back = fed_back + drive.offset[k]
@@ -134,7 +143,7 @@ def _solve(
     rtol: float,
     first_step: float | None,
 ) -> tuple[Array, float | None]:
-    """States (T + 1, 4 N) at times (T + 1,), and a good first step for the next piece."""
+    """States (T + 1, 2 D N) at times (T + 1,), and a good first step for the next piece."""
 
     duration = times[-1] - times[0]
     budget = EVALUATIONS_PER_STEP * (len(times) - 1) + EVALUATIONS_PER_SECOND * duration

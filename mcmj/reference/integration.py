@@ -8,7 +8,8 @@ toolbox_euler        the authors' scheme: spring rates by backward difference,
                      x2 = (l_k - l_{k-1}) / h with l_{-1} = l0; p += h v;  v += h F/m
 toolbox_rk           the same with p += h v + h^2 F/2m, what Runge-Kutta gives for a held force
 
-In the toolbox schemes the output y_k = W_out^T l_k is fed back at step k + 1.
+In the toolbox schemes the output y_k = W_out^T l_k is fed back at step k + 1. Bodies in space, and
+those pushed along another direction than x, run by the same schemes in plain NumPy (`plain_steps`).
 """
 
 from dataclasses import replace
@@ -20,6 +21,7 @@ from mcmj.core.readout import Readout
 from mcmj.core.rollout_arguments import Drive, check_drive
 from mcmj.core.trajectory import State, Trajectory
 from mcmj.reference.dop853 import RTOL, SMALLEST_RTOL, Signal, integrate_continuous, integrate_held
+from mcmj.reference.plain_steps import integrate_plain
 from mcmj.reference.twin.population import Population, rest
 from mcmj.reference.twin.stepping import METHODS as TWINS
 from mcmj.utils.errors import UnknownNameError
@@ -76,6 +78,8 @@ def integrate(
     if method == "dop853":
         require_number("rtol", rtol, SMALLEST_RTOL, 1e-2)
         return integrate_held(body, drive, readout, timestep, start, rtol=rtol)
+    if body.dimensions != 2 or not body.pushed_along_x:
+        return integrate_plain(body, drive, readout, method, timestep, start)
     return _integrate_twin(body, drive, readout, method, timestep, start)
 
 
@@ -122,9 +126,9 @@ def _integrate_twin(
 def _checked_state(body: Body, state: State | None) -> State:
     if state is None:
         return rest(body)
-    shape = (body.n_nodes, 2)
+    shape = body.positions.shape
     as_array("initial_state.positions", state.positions, shape)
     as_array("initial_state.velocities", state.velocities, shape)
     if state.history is not None:
-        as_array("initial_state.history", state.history, (body.n_nodes, 7))
+        as_array("initial_state.history", state.history, (body.n_nodes, 3 * body.dimensions + 1))
     return state

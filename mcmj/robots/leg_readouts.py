@@ -1,21 +1,24 @@
 """What drives a robot's legs in one gait: linear readouts of the body's springs.
 
-The readout of a gait (targets.gaits) says where each leg is, and closes the loop. A second one,
-of the same springs, says how far each leg is lifted; nothing feeds it back:
+The readout of a gait (targets.gaits) says where each leg is, x_i, and closes the loop. A second
+one, of the same springs, says how far each leg is lifted; nothing feeds it back:
 
     z_i = max(0, x_i') / max_t x_i'      x_i rises in swing, when the foot goes forwards
+
+Both are scaled to the set points of the servos (quadruped.Stride), and to a body of the robot's
+size and pace (robots.rescale).
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
 from mcmj.core.body import Body
-from mcmj.core.readout import checked_readout
-from mcmj.core.trajectory import State
+from mcmj.core.readout import Readout, checked_readout
 from mcmj.learning.regression import Fit, Regression
 from mcmj.learning.teaching import synchronise
 from mcmj.robots.quadruped import Stride
+from mcmj.robots.rescale import SIZE, rescaled_readout
 from mcmj.simulation.simulation import Simulation
 from mcmj.targets.limit_cycles import Target
 from mcmj.utils.validation import Array, require_number
@@ -28,19 +31,17 @@ RIDGE_PER_ROW = 1e-6  # a length noise of 1 mm at springs of 10 m
 
 @dataclass(frozen=True, eq=False)
 class LegReadout:
-    """One gait of a body.
+    """One gait of a robot.
 
     Attributes:
-        swing: (L, n_legs) or (L + 1, n_legs), the readout that closes the loop.
-        lift: likewise; not fed back.
-        start: a state of the body in this gait.
-        stride: scale and offset of both, as the robot uses them.
+        w_out: (L + 1, COMMANDS), readouts of what Stride.commands are; the first close the loop.
+        start: (2, 2 n_free) positions [m] and velocities [m/s] of the free nodes' joints.
+        stride: how the robot uses its legs.
     """
 
-    swing: Array
-    lift: Array
-    start: State
-    stride: Stride = field(default_factory=Stride)
+    w_out: Array
+    start: Array
+    stride: Stride
 
 
 def lift_of(outputs: Array) -> Array:
@@ -56,30 +57,39 @@ def teach_lift(
     target: Target,
     *,
     stride: Stride | None = None,
+    pace: float = 8.0,
     duration: float = 60.0,
     engine: str = "mujoco",
 ) -> tuple[LegReadout, Fit]:
     """Fit the readout of the lift while the body runs a gait by itself, in closed loop.
 
     Args:
-        body: in the units it was taught in.
+        body: in the units it was taught in, as all arguments.
         w_out: its readout for the gait.
         target: the gait, onto which the body is brought first.
         stride: how the robot uses the legs in it.
+        pace: of the robot's body, as many times faster.
         duration: of the closed loop that is learned from [s].
 
     Raises:
         DivergenceError: the body blew up.
     """
     require_number("duration", duration, target.period)
-    swing = checked_readout(body, w_out)
     simulation = Simulation(body, engine=engine)
     synchronise(simulation, target, SYNCHRONISE)
-    simulation.set_readout(swing)
+    simulation.set_readout(checked_readout(body, w_out))
     simulation.rollout(round(SETTLE / simulation.timestep), record=())
     run = simulation.rollout(round(duration / simulation.timestep))
     regression = Regression(bias=True)
     lifts = lift_of(run.get("outputs"))[::THIN]
     regression.add(run.get("lengths")[::THIN], lifts)
     fit = regression.solve(ridge=RIDGE_PER_ROW * len(lifts))
-    return LegReadout(swing, fit.w_out, simulation.state, stride or Stride()), fit
+    stride, state = stride or Stride(), simulation.state
+    swing, lift = (
+        Readout.from_rows(rescaled_readout(body, w, size=SIZE), body.n_springs).rows
+        for w in (simulation.w_out, fit.w_out)
+    )
+    bias = np.eye(body.n_springs + 1)[:, -1:]
+    moved = (state.positions - body.positions)[body.free].ravel()
+    start = SIZE * np.stack([moved, pace * state.velocities[body.free].ravel()])
+    return LegReadout(stride.commands(swing, lift, bias), start, stride), fit

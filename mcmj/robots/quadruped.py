@@ -1,15 +1,14 @@
 """A simple quadruped in MJCF: a trunk, four telescopic legs, ball feet, a servo at each joint.
 
-Leg i swings about its hip by the angle a_i (forwards positive) and draws in by the length b_i.
-The torque and the force of its two servos are those of a spring and a damper whose set points
-are linear in what the body's springs measure, so they are two of MuJoCo's actuators each:
+Leg i swings about its hip by the angle a_i (forwards positive) and draws in by the length b_i. The
+torque and the force of its two servos are those of a spring and a damper; each is one actuator,
+whose ctrl is its set point, and hears nothing else:
 
-    hip:  K (A_i x_i + c_i) - K a_i - D a_i'       x_i  output i of the body, a leg's position
-    leg:  k B_i z_i         - k b_i - d b_i'       z_i  how far the leg is drawn in, 0 to 1
+    hip:  K (ctrl - a_i) - D a_i'       ctrl = A_i x_i + c_i    x_i  output i of the body, a
+    leg:  k (ctrl - b_i) - d b_i'       ctrl = B_i z_i               leg's position
+                                                                z_i  how far it is drawn in, 0 to 1
 
-The first term is a user actuator with the readout as its weights, run by the compiled
-callback of callbacks.install, the others an affine one. There is no gait in this model; A, B and c
-(Stride) are the scale and offset of a gait's readouts.
+There is no gait in this model; A, B and c (Stride) are the scale and offset of a gait's readouts.
 """
 
 from dataclasses import dataclass, fields
@@ -21,6 +20,7 @@ from mcmj.targets.gaits import LEGS
 from mcmj.utils.validation import Array, as_array, require_number
 
 GRAVITY = 9.81  # m/s^2
+COMMANDS = 3 * len(LEGS)  # to body, hips and legs
 ROBOT_GROUP = 1  # of geoms, for renderers that show nothing else
 
 
@@ -49,6 +49,16 @@ class Stride:
         """An attribute leg by leg (4,)."""
         fore, hind = getattr(self, name)
         return np.array([fore if leg.endswith("F") else hind for leg in LEGS])
+
+    def commands(self, positions: Array, lifts: Array, constant: Array | float = 1.0) -> Array:
+        """What a gait tells body, hips and legs: x_i, A_i x_i + c_i, B_i z_i (T, COMMANDS).
+
+        Args:
+            positions, lifts: x and z (T, 4); or their readouts (L + 1, 4), for that of commands.
+            constant: 1; of readouts, its readout (L + 1, 1).
+        """
+        hips = self.of_legs("swing") * positions + self.of_legs("lean") * constant
+        return np.hstack([positions, hips, self.of_legs("lift") * lifts])
 
 
 STRIDES = {  # a bound pitches the trunk, and so needs its hind legs well under it
@@ -109,9 +119,9 @@ class Quadruped:
 def quadruped_mjcf(robot: Quadruped) -> str:
     """The robot as an MJCF model, for MjSpec.attach.
 
-    Names: body trunk; per leg bodies LF, LF_lower, joints LF_hip, LF_leg, user actuators
-    LF_swing, LF_lift, affine ones LF_hip_servo, LF_leg_servo; sensors LF_length, LF_rate of the
-    leg's joint, then LF_contact. Only feet touch, and only the ground (see mcmj.robots.walk_scene).
+    Names: body trunk; per leg bodies LF, LF_lower, joints LF_hip, LF_leg, actuators of the same
+    names; sensors LF_length, LF_rate of the leg's joint, then LF_contact, then of each actuator
+    LF_hip_force, LF_hip_speed. Only feet touch, and only the ground (see mcmj.robots.walk_scene).
     """
     legs = "".join(_leg(robot, name) for name in LEGS)
     actuators = "".join(_actuators(robot, name) for name in LEGS)
@@ -119,6 +129,11 @@ def quadruped_mjcf(robot: Quadruped) -> str:
         f'<jointpos name="{n}_length" joint="{n}_leg"/><jointvel name="{n}_rate" joint="{n}_leg"/>'
         for n in LEGS
     ) + "".join(f'<touch name="{n}_contact" site="{n}_foot"/>' for n in LEGS)
+    sensors += "".join(
+        f'<actuatorfrc name="{n}_force" actuator="{n}"/>'
+        f'<actuatorvel name="{n}_speed" actuator="{n}"/>'
+        for n in (f"{leg}_{joint}" for leg in LEGS for joint in ("hip", "leg"))
+    )
     size = numbers([1.2 * robot.hip_x, 0.5 * robot.hip_y, 0.12 * robot.leg])
     return f"""<mujoco model="quadruped">
   <default>
@@ -159,13 +174,12 @@ def _leg(robot: Quadruped, name: str) -> str:
 
 def _actuators(robot: Quadruped, name: str) -> str:
     servos = (
-        ("hip", "swing", robot.hip_stiffness, robot.hip_damping),
-        ("leg", "lift", robot.leg_stiffness, robot.leg_damping),
+        ("hip", robot.hip_stiffness, robot.hip_damping),
+        ("leg", robot.leg_stiffness, robot.leg_damping),
     )
     return "".join(
         f"""
-    <general name="{name}_{drive}" joint="{name}_{joint}" biastype="user"/>
-    <general name="{name}_{joint}_servo" joint="{name}_{joint}" gainprm="0" biastype="affine"
-             biasprm="0 {-stiffness!r} {-damping!r}"/>"""
-        for joint, drive, stiffness, damping in servos
+    <general name="{name}_{joint}" joint="{name}_{joint}" gainprm="{stiffness!r}"
+             biastype="affine" biasprm="0 {-stiffness!r} {-damping!r}"/>"""
+        for joint, stiffness, damping in servos
     )

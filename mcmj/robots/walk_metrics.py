@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from mcmj.metrics import gaits, orbits
 from mcmj.utils.errors import InvalidArgumentError
@@ -67,21 +68,27 @@ def joined(parts: Sequence[Walk]) -> Walk:
     return Walk(step * np.arange(1, count + 1, dtype=np.float64), **arrays)
 
 
-def fall_times(walk: Walk, leg: float, slope: float = 0.0) -> Array:
-    """When each copy falls (copies,) [s]; infinite if it does not.
+def fallen(trunk: Array, leg: float, slope: float = 0.0) -> npt.NDArray[np.bool_]:
+    """Whether a robot has fallen, by the pose (..., 7) of its trunk.
 
-    A robot has fallen when its trunk is tilted by more than 60 degrees from the ground's
-    normal, or its middle is lower than half a leg's length.
+    It has when the trunk is tilted by more than 60 degrees from the ground's normal, or its
+    middle is lower than half a leg's length.
 
     Args:
         leg: length of a leg [m].
         slope: of the ground [rad].
     """
     normal = np.array([-np.sin(slope), 0.0, np.cos(slope)])
-    w, x, y, z = np.moveaxis(walk.trunk[..., 3:], -1, 0)
+    w, x, y, z = np.moveaxis(trunk[..., 3:], -1, 0)
     up = np.stack([2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x**2 + y**2)], axis=-1)
-    fallen = (up @ normal < UPRIGHT) | (walk.trunk[..., :3] @ normal < LOW * leg)
-    return np.where(fallen.any(axis=1), walk.times[fallen.argmax(axis=1)], np.inf)
+    found: npt.NDArray[np.bool_] = (up @ normal < UPRIGHT) | (trunk[..., :3] @ normal < LOW * leg)
+    return found
+
+
+def fall_times(walk: Walk, leg: float, slope: float = 0.0) -> Array:
+    """When each copy falls (copies,) [s]; infinite if it does not. See `fallen`."""
+    fell = fallen(walk.trunk, leg, slope)
+    return np.where(fell.any(axis=1), walk.times[fell.argmax(axis=1)], np.inf)
 
 
 def distances(walk: Walk) -> Array:

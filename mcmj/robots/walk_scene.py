@@ -1,7 +1,15 @@
 """The scene of a walk as one MuJoCo model: a planar body, a robot beside it, the ground.
 
-The body is the model that mjcf writes, and the robot (robots.quadruped) is attached to it by
-MjSpec. Gravity cannot move the body's nodes, which slide horizontally.
+The body is the model that mjcf writes, its feedback channels without a law of their own, and the
+robot (robots.quadruped) is attached to it by MjSpec. Gravity cannot move the body's nodes, which
+slide horizontally. What the ground does to leg i may enter the body, through the input
+
+    u_i = g F_i / (M gravity)      F_i = k (b_i - B_i) + d b_i'
+
+F_i is the force that the servo of leg i bears at length b_i and set point B_i, and M is the
+robot's mass without load. Input i pushes the nodes that feedback channel i pushes, as strongly.
+All but B_i, which comes from outside, is an actuator with the legs' sensors as its weights, run
+by the compiled callback of callbacks.install.
 """
 
 from dataclasses import dataclass, replace
@@ -10,6 +18,7 @@ import mujoco
 import numpy as np
 
 from mcmj.core.body import Body
+from mcmj.core.callbacks.pointers import TAG
 from mcmj.mjcf.write import to_mjcf
 from mcmj.robots.quadruped import GRAVITY, Quadruped, quadruped_mjcf
 from mcmj.targets.gaits import LEGS
@@ -17,8 +26,8 @@ from mcmj.utils.errors import InvalidArgumentError
 from mcmj.utils.validation import require_number
 
 ROBOT = "robot/"  # what the names of its parts begin with
+TRUNK = ROBOT + "trunk"
 GROUND_GROUP = 2  # of geoms, for renderers that leave the ground out
-LEG_SENSORS = 2 * len(LEGS)  # length and rate of each leg, right after the springs' lengths
 
 
 @dataclass(frozen=True)
@@ -38,19 +47,18 @@ class Terrain:
         require_number("load", self.load, 0.0)
 
 
-def walking_model(
-    body: Body, robot: Quadruped, terrain: Terrain, *, timestep: float, integrator: str
-) -> mujoco.MjModel:
-    """One model of a body (w_in of four channels) and a robot beside it.
+def walking_model(body: Body, robot: Quadruped, terrain: Terrain, bearing: float) -> mujoco.MjSpec:
+    """One model of a body and a robot beside it.
+
+    Args:
+        bearing: g / (M gravity) [1/N].
 
     Raises:
-        InvalidArgumentError: a body without a channel a leg.
+        InvalidArgumentError: a body without a feedback channel a leg.
     """
-    if (body.n_inputs, body.n_outputs) != (len(LEGS), len(LEGS)):
-        raise InvalidArgumentError("body", f"{len(LEGS)} inputs and outputs, one a leg", body)
-    no_readout = np.zeros((body.n_springs + 1, len(LEGS)))
-    text = to_mjcf(body, timestep=timestep, integrator=integrator, w_out=no_readout)
-    spec = mujoco.MjSpec.from_string(text)
+    if body.n_outputs != len(LEGS):
+        raise InvalidArgumentError("body", f"{len(LEGS)} feedback channels, one a leg", body)
+    spec = mujoco.MjSpec.from_string(to_mjcf(replace(body, w_in=body.w_fb)))
     spec.option.gravity = [0.0, 0.0, -GRAVITY]
     # contacts of the feet need constraints; a state that blew up is kept for the error message
     spec.option.disableflags = mujoco.mjtDisableBit.mjDSBL_AUTORESET.value
@@ -66,8 +74,19 @@ def walking_model(
     frame = spec.worldbody.add_frame(pos=above + np.array([0.0, beside, 0.0]), quat=tilt)
     loaded = replace(robot, trunk=robot.trunk + terrain.load)
     spec.attach(mujoco.MjSpec.from_string(quadruped_mjcf(loaded)), prefix=ROBOT, frame=frame)
-    spec.nuser_actuator = body.n_springs + LEG_SENSORS + 1
-    return spec.compile()
+    _couple(spec, robot, body.n_springs, bearing)
+    return spec
+
+
+def _couple(spec: mujoco.MjSpec, robot: Quadruped, n_springs: int, bearing: float) -> None:
+    """What the legs' sensors, which follow the springs' lengths, bring into the body."""
+    heard = bearing * np.array([robot.leg_stiffness, robot.leg_damping])
+    for i in range(len(LEGS)):
+        spec.actuator(f"fb{i}").biastype = mujoco.mjtBias.mjBIAS_NONE
+        actuator = spec.actuator(f"in{i}")
+        actuator.biastype = mujoco.mjtBias.mjBIAS_USER
+        actuator.biasprm[:5] = [1.0, TAG, n_springs, 2 * len(LEGS), 0.0]
+        actuator.userdata = np.kron(np.eye(len(LEGS))[i], heard)
 
 
 def _paint_squares(spec: mujoco.MjSpec, side: float) -> None:

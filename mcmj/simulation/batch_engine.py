@@ -5,6 +5,7 @@ common: the state, the drive, and the check that the numbers are finite. Arrays 
 their first axis.
 """
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import mujoco
@@ -27,18 +28,22 @@ POSITION_STAGE = mujoco.mjtStage.mjSTAGE_POS.value
 
 
 class Channels(NamedTuple):
-    """Where a drive enters a model.
+    """Where a drive enters a model, and what its readout hears.
 
     Attributes:
         inputs, outputs: the actuators of inputs and of feedback channels.
-        pushed: degrees of freedom that forces act on, and ..
-        forces: .. which column of the forces acts on each.
+        forces: which columns of the forces act.
+        pushed: the degrees of freedom that each of them acts on, and its share there.
+        signals: (n_signals,) where they stand in sensordata.
+        late: (n_signals,) bool: MuJoCo computes it after actuation.
     """
 
     inputs: slice
     outputs: slice
-    pushed: npt.NDArray[np.int64]
     forces: npt.NDArray[np.int64]
+    pushed: Sequence[tuple[npt.NDArray[np.int64], float]]
+    signals: npt.NDArray[np.int64]
+    late: npt.NDArray[np.bool_]
 
 
 class BatchEngine:
@@ -67,8 +72,8 @@ class BatchEngine:
         require_count("copies", copies, 1)
         require_count("threads", threads, 1)
         self.model, self.timestep, self.substeps = model, timestep, substeps
-        self._channels = channels
-        self._batch = Batch(model, copies, threads)
+        self.channels = channels
+        self.batch = Batch(model, copies, threads)
         if threads > 1:
             guard_against_forks(self)
         self._views: dict[str, Array] = {}
@@ -79,12 +84,12 @@ class BatchEngine:
     @property
     def copies(self) -> int:
         """Number of simulations."""
-        return int(self._batch.nsim)
+        return int(self.batch.nsim)
 
     def bound(self, name: str) -> Array:
         """A view (copies, n) of the simulations' data, made once: making one is slow."""
         if name not in self._views:
-            self._views[name] = self._batch.bind(name)
+            self._views[name] = self.batch.bind(name)
         return self._views[name]
 
     def leave_behind(self) -> None:
@@ -93,22 +98,22 @@ class BatchEngine:
 
     def reset(self) -> None:
         """All copies back to the start, time 0."""
-        self._batch.reset(stage=_NO_STAGE)
+        self.batch.reset(stage=_NO_STAGE)
         self.alive[:] = True
         self.steps_done = 0
 
     def set_readout(self, w_out: Array | None) -> None:
         """Readouts (rows, n_outputs) for all copies, or (copies, rows, n_outputs)."""
-        if self._channels.outputs.stop == self._channels.outputs.start:
+        if self.channels.outputs.stop == self.channels.outputs.start:
             return
-        weights = self._batch.expand("actuator_user")[:, self._channels.outputs]
+        weights = self.batch.expand("actuator_user")[:, self.channels.outputs]
         weights[:] = 0.0
         if w_out is not None:
             weights[:, :, : w_out.shape[-2]] = np.swapaxes(w_out, -1, -2)
 
     def snapshot(self) -> Array:
         """Full integration state (copies, n): all that `restore` needs."""
-        return np.column_stack([self._batch.state, np.full(self.copies, float(self.steps_done))])
+        return np.column_stack([self.batch.state, np.full(self.copies, float(self.steps_done))])
 
     def restore(self, snapshot: Array) -> None:
         """Continue from a snapshot, bit for bit.
@@ -116,56 +121,57 @@ class BatchEngine:
         Raises:
             InvalidArgumentError: another shape.
         """
-        shape = (self.copies, self._batch.nstate + 1)
+        shape = (self.copies, self.batch.nstate + 1)
         if snapshot.shape != shape:
             raise InvalidArgumentError("snapshot", f"shape {shape}", f"shape {snapshot.shape}")
-        self._batch.state[:] = snapshot[:, :-1]
+        self.batch.state[:] = snapshot[:, :-1]
         self.alive[:] = True
         self.steps_done = int(snapshot[0, -1])
 
     def sensors_now(self) -> Array:
         """All sensors (copies, n) of the state as it is."""
         sensors = self.bound("sensordata")
-        self._install()
+        self.install()
         with quiet_warnings():
-            self._batch.forward(stage=self._stage)
+            self.batch.forward(stage=self._stage)
         return sensors
 
     # --- stepping ----------------------------------------------------------------------------
 
     def prepare(self, drive: Drive) -> None:
         """Set gates and clear old inputs before the first chunk of a drive."""
-        gates = self._batch.expand("actuator_biasprm")[:, self._channels.outputs, 0]
+        gates = self.batch.expand("actuator_biasprm")[:, self.channels.outputs, 0]
         gates[:] = drive.gate
-        self._batch.ctrl = 0.0
-        self._batch.qfrc_applied = 0.0
+        self.batch.ctrl = 0.0
+        self.batch.qfrc_applied = 0.0
 
-    def _install(self) -> None:
+    def install(self) -> None:
         """Callbacks again: somebody may have taken them out since the last chunk."""
         install.install(passive=self._passive)
 
     def _advance(self, drive: Drive, start: int, stop: int, fields: list[str]) -> dict[str, Array]:
         """Fields (copies, steps, n) after each physics step of control steps start .. stop - 1."""
-        self._install()
+        self.install()
         steps = (stop - start) * self.substeps
         control, spec = self._control(drive, start, stop)
         before = self.bound("time").copy()
         with quiet_warnings():
-            rows: dict[str, Array] = self._batch.rollout(steps, control, spec, fields or [_TIME])
+            rows: dict[str, Array] = self.batch.rollout(steps, control, spec, fields or [_TIME])
         self._check_alive(before, steps)
         self.steps_done += stop - start
         return rows
 
     def _control(self, drive: Drive, start: int, stop: int) -> tuple[Array | None, int]:
         """Rows (copies, steps, n) of ctrl, and of qfrc_applied if forces vary, and their spec."""
-        forces, at = drive.forces, self._channels
+        forces, at = drive.forces, self.channels
         lead: tuple[int, ...] = ()
         for array in (drive.inputs, drive.offset, forces):
             if array is not None and array.ndim == 3:
                 lead = (self.copies,)
         varying = forces is not None and forces.shape[-2] > 1
         if forces is not None and not varying:
-            self.bound("qfrc_applied")[:, at.pushed] = forces[..., 0, at.forces]
+            for dofs, share in at.pushed:
+                self.bound("qfrc_applied")[:, dofs] = share * forces[..., 0, at.forces]
         if drive.inputs is None and drive.offset is None and not varying:
             return None, _CTRL
         nu, n_applied = self.model.nu, self.model.nv if varying else 0
@@ -174,7 +180,8 @@ class BatchEngine:
             if rows is not None:
                 control[..., place] = rows[..., start:stop, :]
         if varying and forces is not None:
-            control[..., nu + at.pushed] = forces[..., start:stop, at.forces]
+            for dofs, share in at.pushed:
+                control[..., nu + dofs] = share * forces[..., start:stop, at.forces]
         spec = _CTRL | _APPLIED if varying else _CTRL
         return np.repeat(control, self.substeps, axis=-2), spec
 

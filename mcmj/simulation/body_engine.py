@@ -52,11 +52,16 @@ class BodyEngine(BatchEngine):
             model.sensor_interval[: body.n_springs, 1] -= timestep
         if law is not None:
             model.tendon_user[: body.n_springs, 1] = law.key(body.n_springs)
+        # joints are n<i>x, n<i>y (, n<i>z) in node order
+        first = body.dimensions * np.arange(len(body.free))
         channels = Channels(
             inputs=slice(0, body.n_inputs),
             outputs=slice(body.n_inputs, model.nu),
-            pushed=2 * np.arange(len(body.free)),  # joints are n<i>x, n<i>y in node order
             forces=body.free,
+            pushed=[(first + i, share) for i, share in enumerate(body.direction) if share],
+            # the last L sensors are never delayed or held
+            signals=np.arange(model.nsensordata - body.n_springs, model.nsensordata),
+            late=np.zeros(body.n_springs, dtype=np.bool_),
         )
         super().__init__(
             model, channels, timestep=timestep, substeps=substeps, copies=copies, threads=threads
@@ -64,8 +69,8 @@ class BodyEngine(BatchEngine):
 
     def alter(self, cut: Sequence[int], masses: Array | None) -> None:
         """Cut springs and change masses (N,) [kg] of all copies, for good."""
-        self._install()
-        alter(self._batch, self.body, cut, masses)
+        self.install()
+        alter(self.batch, self.body, cut, masses)
 
     def pushes(self, forces: object) -> Array:
         """Forces by name are for models.
@@ -79,7 +84,7 @@ class BodyEngine(BatchEngine):
 
     @property
     def state(self) -> State:
-        """Positions and velocities (copies, N, 2) now."""
+        """Positions and velocities (copies, N, D) now."""
         return State(
             positions=self._positions(self.bound("qpos")),
             velocities=self._velocities(self._joint_velocities()),
@@ -87,8 +92,8 @@ class BodyEngine(BatchEngine):
         )
 
     def set_state(self, positions: object, velocities: object) -> None:
-        """Positions and velocities (N, 2) for all copies, or (copies, N, 2); None: as they are."""
-        free = self.body.free
+        """Positions and velocities (N, D) for all copies, or (copies, N, D); None: as they are."""
+        free, shape = self.body.free, self.body.positions.shape
         if self._by_callback:  # starts anew
             self.bound("qvel")[:] = self._joint_velocities()
             self.bound("userdata")[:] = 0.0
@@ -98,7 +103,7 @@ class BodyEngine(BatchEngine):
         ):
             if value is not None:
                 lead = (self.copies,) if np.asarray(value).ndim == 3 else ()
-                array = as_array(name, value, (*lead, self.body.n_nodes, 2)) - origin
+                array = as_array(name, value, (*lead, *shape)) - origin
                 self.bound(field)[:] = array[..., free, :].reshape(*lead, -1)
 
     def current_signals(self) -> Array:
@@ -107,10 +112,11 @@ class BodyEngine(BatchEngine):
         return found
 
     def _positions(self, qpos: Array) -> Array:
-        """Node positions (..., N, 2) from joint positions (..., nq)."""
-        positions = np.empty((*qpos.shape[:-1], self.body.n_nodes, 2))
+        """Node positions (..., N, D) from joint positions (..., nq)."""
+        shape = self.body.positions.shape
+        positions = np.empty((*qpos.shape[:-1], *shape))
         positions[:] = self.body.positions
-        positions[..., self.body.free, :] += qpos.reshape(*qpos.shape[:-1], -1, 2)
+        positions[..., self.body.free, :] += qpos.reshape(*qpos.shape[:-1], -1, shape[1])
         return positions
 
     def _joint_velocities(self) -> Array:
@@ -119,9 +125,10 @@ class BodyEngine(BatchEngine):
         return node_velocities(qvel, userdata, self._physics_step)
 
     def _velocities(self, qvel: Array) -> Array:
-        """Node velocities (..., N, 2) from joint velocities (..., nv)."""
-        velocities = np.zeros((*qvel.shape[:-1], self.body.n_nodes, 2))
-        velocities[..., self.body.free, :] = qvel.reshape(*qvel.shape[:-1], -1, 2)
+        """Node velocities (..., N, D) from joint velocities (..., nv)."""
+        shape = self.body.positions.shape
+        velocities = np.zeros((*qvel.shape[:-1], *shape))
+        velocities[..., self.body.free, :] = qvel.reshape(*qvel.shape[:-1], -1, shape[1])
         return velocities
 
     # --- stepping ----------------------------------------------------------------------------
@@ -155,6 +162,6 @@ class BodyEngine(BatchEngine):
     def _fastest(self, copy: int) -> str:
         velocities = self._velocities(self.bound("qvel")[copy])
         with np.errstate(over="ignore"):
-            speed = np.hypot(*np.nan_to_num(velocities, nan=np.inf).T)
+            speed = np.hypot.reduce(np.nan_to_num(velocities, nan=np.inf), axis=1)
         node = int(speed.argmax())
         return f"node {node} (speed {speed[node]:.3g} m/s), integrator {self.options.integrator}"

@@ -63,7 +63,7 @@ class Engine(Protocol):
         """Cut springs and change masses, for good."""
 
     def pushes(self, forces: Any) -> Array:
-        """Forces on bodies by name as (n_bodies, 6)."""
+        """Forces on bodies by name as (copies, n_bodies, 6)."""
 
     def prepare(self, drive: Drive) -> None:
         """Before the first chunk of a drive."""

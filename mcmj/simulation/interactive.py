@@ -1,6 +1,6 @@
-"""A body in closed loop that one may disturb at any moment: what the viewer steps.
+"""A reservoir in closed loop that one may disturb at any moment: what the viewer steps.
 
-MuJoCo's own model and data, with mcmj's callback installed; no window here.
+MuJoCo's own model and data, with mcmj's callbacks installed; no window here.
 """
 
 from collections.abc import Mapping
@@ -8,56 +8,46 @@ from collections.abc import Mapping
 import mujoco
 import numpy as np
 
-from mcmj.core.body import Body
-from mcmj.core.callbacks import install
 from mcmj.core.readout import Readout
-from mcmj.core.trajectory import State
-from mcmj.mjcf.read import load_model
-from mcmj.mjcf.write import to_mjcf
+from mcmj.simulation.reservoir import Reservoir
 from mcmj.utils.errors import InvalidArgumentError, UnknownNameError
 from mcmj.utils.quiet import quiet_warnings
 from mcmj.utils.validation import MOST_STEPS, Array, require_count, require_number
 
+_STATE = mujoco.mjtState.mjSTATE_INTEGRATION.value
+
 
 class LiveLoop:
-    """A body with one or more readouts; the loop is closed by the first.
+    """A body or model with one or more readouts; the loop is closed by the first.
 
     Args:
-        readouts: by name, (L or L + 1, n_outputs) each.
-        start: positions, velocities and time to start from; None: total rest.
+        reservoir: where it is now the loop starts, and starts again; it is not changed.
+        readouts: by name, (n_signals or n_signals + 1, n_outputs) each.
 
     Raises:
         InvalidArgumentError: no readout, or one that does not fit.
     """
 
-    def __init__(
-        self,
-        body: Body,
-        readouts: Mapping[str, Array],
-        *,
-        start: State | None = None,
-    ) -> None:
+    def __init__(self, reservoir: Reservoir, readouts: Mapping[str, Array]) -> None:
         if not readouts:
             raise InvalidArgumentError("readouts", "at least one", "none")
-        self.body, self._start = body, start
+        self.reservoir, self._engine = reservoir, reservoir.in_mujoco
+        n_signals, n_outputs = reservoir.n_signals, reservoir.n_outputs
         self._readouts = {
-            name: Readout.of(value, body.n_springs, body.n_outputs, name)
-            for name, value in readouts.items()
+            name: Readout.of(value, n_signals, n_outputs, name) for name, value in readouts.items()
         }
-        install.install()
-        room = np.zeros((body.n_springs + 1, body.n_outputs))
-        self._model = load_model(to_mjcf(body, w_out=room))
-        self.timestep = float(self._model.opt.timestep)
-        self._data = mujoco.MjData(self._model)
-        self._feedback = slice(body.n_inputs, body.n_inputs + body.n_outputs)
-        self._bodies = np.array([self._model.body(f"n{i}").id for i in body.free])
+        self.model = self._engine.batch.get_model(0)
+        self.data = mujoco.MjData(self.model)
+        self.timestep = float(self.model.opt.timestep)
+        self._start = self._engine.batch.state[0].copy()
+        self._outputs_at = self._engine.channels.outputs
         self.switch(next(iter(self._readouts)))
         self.reset()
 
     @property
     def time(self) -> float:
         """Since the start of the simulation [s]."""
-        return float(self._data.time)
+        return float(self.data.time)
 
     @property
     def readout_names(self) -> list[str]:
@@ -65,46 +55,36 @@ class LiveLoop:
         return list(self._readouts)
 
     @property
-    def positions(self) -> Array:
-        """Of the nodes now (N, 2) [m]."""
-        positions = self.body.positions.copy()
-        positions[self.body.free] += self._data.qpos.reshape(-1, 2)
-        return positions
-
-    @property
     def outputs(self) -> Array:
         """What is fed back now (n_outputs,): the readout's outputs, or their frozen values."""
         with quiet_warnings():
-            mujoco.mj_fwdPosition(self._model, self._data)
-            mujoco.mj_sensorPos(self._model, self._data)
-        now = self._readouts[self.readout].outputs(self._data.sensordata[: self.body.n_springs])
-        return np.where(self.frozen, self._data.ctrl[self._feedback], now)
+            mujoco.mj_fwdPosition(self.model, self.data)
+            mujoco.mj_sensorPos(self.model, self.data)
+            mujoco.mj_sensorVel(self.model, self.data)
+        signals = self.data.sensordata[self._engine.channels.signals]
+        now = self._readouts[self.readout].outputs(signals)
+        return np.where(self.frozen, self.data.ctrl[self._outputs_at], now)
 
     @property
     def alive(self) -> bool:
         """Whether all numbers are finite still."""
-        return bool(np.isfinite(self._data.qpos).all() and np.isfinite(self._data.qvel).all())
+        return bool(np.isfinite(self.data.qpos).all() and np.isfinite(self.data.qvel).all())
 
     def reset(self) -> None:
         """Back to the start, nothing frozen; the readout stays."""
-        data = self._data
-        mujoco.mj_resetData(self._model, data)
-        self.frozen = np.zeros(self.body.n_outputs, dtype=bool)
-        self._model.actuator_biasprm[self._feedback, 0] = 1.0
-        if self._start is not None:
-            free = self.body.free
-            data.qpos[:] = (self._start.positions - self.body.positions)[free].ravel()
-            data.qvel[:] = self._start.velocities[free].ravel()
-            data.time = self._start.time
+        mujoco.mj_resetData(self.model, self.data)
+        mujoco.mj_setState(self.model, self.data, self._start, _STATE)
+        self.data.ctrl[:] = 0.0
+        self.frozen = np.zeros(self.reservoir.n_outputs, dtype=bool)
+        self.model.actuator_biasprm[self._outputs_at, 0] = 1.0
 
-    def advance(self, steps: int, forces: Array | None = None) -> None:
-        """Do steps, with constant forces (N, 2) on the nodes [N]."""
+    def advance(self, steps: int, pushes: Array | None = None) -> None:
+        """Do steps, with constant forces and torques (n_bodies, 6) on the bodies [N], [N m]."""
         require_count("steps", steps, 1, MOST_STEPS)
-        install.install()
-        pushed = 0.0 if forces is None else forces[self.body.free]
-        self._data.xfrc_applied[self._bodies, :2] = pushed
+        self._engine.install()
+        self.data.xfrc_applied[:] = 0.0 if pushes is None else pushes
         with quiet_warnings():
-            mujoco.mj_step(self._model, self._data, nstep=steps)
+            mujoco.mj_step(self.model, self.data, nstep=steps)
 
     def freeze(self, channel: int) -> None:
         """Hold an output at its present value, or let it go again.
@@ -112,18 +92,19 @@ class LiveLoop:
         Raises:
             InvalidArgumentError: no such output.
         """
-        if not 0 <= channel < self.body.n_outputs:
-            raise InvalidArgumentError("channel", f"0 to {self.body.n_outputs - 1}", channel)
-        actuator = self.body.n_inputs + channel
+        n_outputs = self.reservoir.n_outputs
+        if not 0 <= channel < n_outputs:
+            raise InvalidArgumentError("channel", f"0 to {n_outputs - 1}", channel)
+        actuator = self._outputs_at.start + channel
         held = 0.0 if self.frozen[channel] else self.outputs[channel]
-        self._data.ctrl[actuator] = held
+        self.data.ctrl[actuator] = held
         self.frozen[channel] = not self.frozen[channel]
-        self._model.actuator_biasprm[actuator, 0] = float(not self.frozen[channel])
+        self.model.actuator_biasprm[actuator, 0] = float(not self.frozen[channel])
 
     def kick(self, speed: float, draw: np.random.Generator) -> None:
-        """Add random velocities of this standard deviation [m/s] to all free nodes."""
+        """Add random velocities of this standard deviation, MuJoCo's units, to all joints."""
         require_number("speed", speed, 0.0)
-        self._data.qvel[:] += speed * draw.standard_normal(self._data.qvel.shape)
+        self.data.qvel[:] += speed * draw.standard_normal(self.data.qvel.shape)
 
     def switch(self, name: str) -> None:
         """Close the loop by another readout.
@@ -134,7 +115,8 @@ class LiveLoop:
         if name not in self._readouts:
             raise UnknownNameError("readout", name, self._readouts)
         self.readout = name
-        self._model.actuator_user[self._feedback] = self._readouts[name].rows.T
+        rows = self._readouts[name].rows
+        self.model.actuator_user[self._outputs_at, : len(rows)] = rows.T
 
     def switch_next(self) -> None:
         """Close the loop by the next readout, the first after the last."""

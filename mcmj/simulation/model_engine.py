@@ -36,35 +36,42 @@ class ModelEngine(BatchEngine):
         channels = Channels(
             inputs=slice(first + n_outputs, first + n_outputs + len(adopted.input_names)),
             outputs=slice(first, first + n_outputs),
-            pushed=dofs,
             forces=dofs,
+            pushed=[(dofs, 1.0)],
+            signals=adopted.signals,
+            late=adopted.late,
         )
         timestep = float(adopted.model.opt.timestep)
         super().__init__(adopted.model, channels, timestep=timestep, copies=copies, threads=threads)
 
-    def _install(self) -> None:
-        super()._install()
+    def install(self) -> None:
+        """Callbacks again, that of the reservoir's law too."""
+        super().install()
         install.install_control()
 
     def pushes(self, forces: Mapping[str, object]) -> Array:
-        """Forces (3,) [N], or forces and torques (6,), on bodies by name, as (n_bodies, 6).
+        """Forces (3,) [N], or forces and torques (6,), on bodies by name, as (copies, n_bodies, 6).
+
+        Each is the same for all copies, or (copies, 3) or (copies, 6).
 
         Raises:
             InvalidArgumentError, UnknownNameError: wrong shape, or no such body.
         """
         names = [self.model.body(i).name for i in range(self.model.nbody)]
-        found = np.zeros((self.model.nbody, 6))
+        found = np.zeros((self.copies, self.model.nbody, 6))
         for name, force in forces.items():
             if name not in names:
                 raise UnknownNameError("body", name, [known for known in names if known])
-            given = as_array(f"forces on {name}", force, (None,))
-            size = 6 if len(given) == 6 else 3
-            found[names.index(name), :size] = as_array(f"forces on {name}", given, (size,))
+            shape = np.asarray(force).shape
+            lead = (self.copies,) if len(shape) == 2 else ()
+            size = 6 if shape[-1:] == (6,) else 3
+            given = as_array(f"forces on {name}", force, (*lead, size))
+            found[:, names.index(name), :size] = given
         return found
 
     def alter(self, cut: Sequence[str], masses: Mapping[str, float] | None) -> None:
         """Tendons without force; masses [kg] of bodies, their inertia in proportion."""
-        alter_model(self._batch, self.model, cut, masses or {})
+        alter_model(self.batch, self.model, cut, masses or {})
 
     # --- state -------------------------------------------------------------------------------
 

@@ -20,8 +20,10 @@ from mcmj.utils.validation import as_array, require_count, require_duration, req
 
 @dataclass(frozen=True)
 class RandomForces:
-    """Forces uniform in [-scale, scale], drawn once a phase: horizontal ones on all nodes [N], or
-    on all degrees of freedom of a model [N or N m]."""
+    """Forces uniform in [-scale, scale], drawn once a phase.
+
+    On all nodes of a body, along its direction [N]; on all degrees of freedom of a model.
+    """
 
     scale: float
 

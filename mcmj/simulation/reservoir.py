@@ -9,35 +9,27 @@ of RK4.
 """
 
 import copy
-import hashlib
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import replace
-from functools import cached_property
-from typing import Any, ClassVar, Self
+from collections.abc import Sequence
+from typing import Any, Self
 
 import mujoco
 import numpy as np
 import numpy.typing as npt
 
-from mcmj.core.readout import Readout, is_pair, readout_rows
-from mcmj.core.rollout_arguments import Drive, check_drive
-from mcmj.core.trajectory import Trajectory, join
+from mcmj.simulation.batch_engine import BatchEngine
 from mcmj.simulation.damage import check_model_damage
 from mcmj.simulation.engines import Engine
+from mcmj.simulation.loop import CHUNK as CHUNK
+from mcmj.simulation.loop import Loop
 from mcmj.simulation.model_engine import ModelEngine
 from mcmj.simulation.models.adopt import Model, adopt, read_spec
 from mcmj.simulation.models.names import Channels
 from mcmj.simulation.models.reservoir_file import read_reservoir, write_reservoir
-from mcmj.simulation.one_drive import OneDrive
-from mcmj.utils.errors import DivergenceError, InvalidArgumentError, UnknownNameError
-from mcmj.utils.validation import MOST_STEPS, Array, as_array, require_count
-
-CHUNK = 16384  # control steps at a time in C: 8 MB of 61 signals
-
-Hook = Callable[[float, Array], Array]
+from mcmj.utils.errors import InvalidArgumentError
+from mcmj.utils.validation import Array, as_array
 
 
-class Reservoir(OneDrive):
+class Reservoir(Loop):
     """A MuJoCo model as a reservoir; its state carries over from one rollout to the next.
 
     Args:
@@ -62,9 +54,7 @@ class Reservoir(OneDrive):
         InvalidArgumentError, UnknownNameError: an argument out of bounds, an unknown name.
     """
 
-    _engine: Engine
-    _copies: int | None = None
-    _aliases: ClassVar[dict[str, str]] = {}  # what users call what is recorded
+    _alterations: tuple[tuple[Sequence[Any], Any], ...] = ()  # all that `alter` was given
 
     def __init__(
         self,
@@ -91,11 +81,6 @@ class Reservoir(OneDrive):
         engine = ModelEngine(self._adopted, copies=1 if copies is None else copies, threads=threads)
         self._begin(engine, w_out, copies)
 
-    def _begin(self, engine: Engine, w_out: object, copies: int | None) -> None:
-        self._engine, self._copies = engine, copies
-        self._alterations: tuple[tuple[Sequence[Any], Any], ...] = ()
-        self.set_readout(w_out)
-
     def with_copies(self, copies: int, threads: int = 1, *, lenient: bool = False) -> Self:
         """Independent copies of this reservoir at its start, cuts, masses and readout as they are.
 
@@ -110,7 +95,7 @@ class Reservoir(OneDrive):
         if self._copies is not None:
             raise InvalidArgumentError("reservoir", "one without copies", f"{self._copies}")
         other = copy.copy(self)
-        other._driven = False
+        other._driven, other._alterations = False, ()
         other._begin(self._new_engine(copies, threads), self._w_out, copies)
         if lenient:
             other._engine.leave_behind()
@@ -166,30 +151,9 @@ class Reservoir(OneDrive):
         return self._adopted.input_names
 
     @property
-    def late_signals(self) -> tuple[str, ...]:
-        """Names of the signals that are heard as they were one step before."""
-        pairs = zip(self.signal_names, self._adopted.late, strict=True)
-        return tuple(name for name, late in pairs if late)
-
-    @property
     def feedback_delay(self) -> int:
         """Steps between a signal and the force it feeds back."""
         return int(self._adopted.asked["feedback_delay"])
-
-    @property
-    def n_signals(self) -> int:
-        """Number of signals that the readout hears."""
-        return len(self.signal_names)
-
-    @property
-    def n_outputs(self) -> int:
-        """Number of feedback channels."""
-        return len(self.channel_names)
-
-    @property
-    def n_inputs(self) -> int:
-        """Number of input channels."""
-        return len(self.input_names)
 
     @property
     def n_forces(self) -> int:
@@ -197,61 +161,19 @@ class Reservoir(OneDrive):
         return int(self.model.nv)
 
     @property
-    def copies(self) -> int | None:
-        """Number of copies; None: one, without an axis for it."""
-        return self._copies
-
-    @property
-    def timestep(self) -> float:
-        """Control step [s]."""
-        return self._engine.timestep
-
-    @property
-    def time(self) -> float:
-        """Simulation time [s]."""
-        return self._engine.steps_done * self._engine.timestep
-
-    # --- readout -----------------------------------------------------------------------------
-
-    @property
-    def w_out(self) -> Array | None:
-        """The readout in use, as one array."""
-        return self._w_out
-
-    @property
-    def readout(self) -> Readout:
-        """The readout in use; without one, it always says 0."""
-        if self._w_out is None:
-            return Readout.of(None, self.n_signals, self.n_outputs)
-        return Readout.from_rows(self._w_out, self.n_signals)
-
-    def set_readout(self, w_out: object) -> None:
-        """Replace the readout, from the next step on; None takes it away.
+    def in_mujoco(self) -> BatchEngine:
+        """MuJoCo's side: the batch, and where channels and signals are in its model.
 
         Raises:
-            InvalidArgumentError: wrong shape, or NaN.
+            InvalidArgumentError: the engine is not MuJoCo, or there are copies.
         """
-        self._w_out = None if w_out is None else self.checked_readout(w_out)
-        self._engine.set_readout(self._w_out)
-
-    def checked_readout(self, w_out: object) -> Array:
-        """A readout as one array (n_signals, n_outputs), or with the bias as one row more.
-
-        Raises:
-            InvalidArgumentError: wrong shape, or NaN.
-        """
-        one = isinstance(w_out, Readout) or is_pair(w_out)
-        if self._copies is None or one or np.asarray(w_out).ndim != 3:
-            return readout_rows(w_out, self.n_signals, self.n_outputs)
-        readouts = as_array("w_out", w_out, (self._copies, None, self.n_outputs))
-        readout_rows(readouts[0], self.n_signals, self.n_outputs)  # all have the same shape
-        return readouts
+        if not isinstance(self._engine, BatchEngine):
+            raise InvalidArgumentError("engine", "'mujoco', which has a model", "'twin'")
+        if self._copies is not None:
+            raise InvalidArgumentError("reservoir", "one without copies", self._copies)
+        return self._engine
 
     # --- state -------------------------------------------------------------------------------
-
-    def reset(self) -> None:
-        """Back to the start, at time 0."""
-        self._engine.reset()
 
     def restart(self, qpos: object = None, qvel: object = None, act: object = None) -> None:
         """Time 0 in a state of MuJoCo's own coordinates; None: as at the start.
@@ -301,32 +223,6 @@ class Reservoir(OneDrive):
         """(copies,): which have not blown up since the start; all, unless `lenient`."""
         return self._engine.alive.copy()
 
-    @property
-    def signals(self) -> Array:
-        """What the readout would hear now (n_signals,)."""
-        return self._public(self._engine.current_signals())
-
-    def snapshot(self) -> Array:
-        """The full integration state; `restore` continues from it bit for bit.
-
-        Its last column is a number that only the same model and settings have.
-        """
-        state = self._engine.snapshot()
-        return np.column_stack([state, np.full(len(state), self._fingerprint)])
-
-    def restore(self, snapshot: Array) -> None:
-        """Continue from a `snapshot` of a reservoir of the same model and settings.
-
-        Raises:
-            InvalidArgumentError: a snapshot of another model, time step or other setting.
-        """
-        values = np.asarray(snapshot)
-        if values.ndim != 2 or (values[:, -1:] != self._fingerprint).any():
-            raise InvalidArgumentError(
-                "snapshot", f"one of {self._described()}", f"another, of shape {values.shape}"
-            )
-        self._engine.restore(values[:, :-1])
-
     def check_alteration(self, cut: Sequence[Any], masses: Any) -> None:
         """Raise unless `alter` can do this.
 
@@ -345,86 +241,7 @@ class Reservoir(OneDrive):
         self._engine.alter(cut, masses)
         self._alterations += ((tuple(cut), copy.copy(masses)),)
 
-    # --- stepping ----------------------------------------------------------------------------
-
-    def rollout(
-        self,
-        steps: int | None = None,
-        inputs: object = None,
-        offset: object = None,
-        gate: object = None,
-        forces: object = None,
-        *,
-        record: Sequence[str] = ("signals", "outputs"),
-        hook: Hook | None = None,
-    ) -> Trajectory:
-        """Advance by T control steps and return what was recorded.
-
-        Args:
-            steps: T; not needed if something is given over time.
-            inputs: (T, n_inputs).
-            offset: (T, n_outputs), added to the fed-back outputs; the teacher in teacher forcing.
-            gate: (n_outputs,) or a number; default: 1 with a readout, else 0.
-            forces: (n_forces,) or (T, n_forces): on the degrees of freedom [N or N m], of a body
-                horizontally on its nodes [N]; or {body: (3,) [N]} constant, on bodies of a model.
-            record: any of "signals", "outputs"; of a model also "qpos", "qvel", "sensordata"
-                (all of its sensors), of a body "positions", "velocities".
-            hook: slow (one Python call a control step): function (time, signals (n_signals,)) ->
-                (n_forces,) forces during that step, for laws that nothing else covers.
-
-        Raises:
-            DivergenceError: the simulation blew up.
-            InvalidArgumentError, UnknownNameError: an argument out of bounds.
-        """
-        return join(
-            list(self.stream(steps, inputs, offset, gate, forces, record=record, hook=hook))
-        )
-
-    def stream(
-        self,
-        steps: int | None = None,
-        inputs: object = None,
-        offset: object = None,
-        gate: object = None,
-        forces: object = None,
-        *,
-        record: Sequence[str] = ("signals", "outputs"),
-        hook: Hook | None = None,
-        chunk: int = CHUNK,
-    ) -> Iterator[Trajectory]:
-        """As `rollout`, yielding chunks: memory stays flat however long the run is.
-
-        Raises:
-            McmjError: another stream or rollout of this simulation begins before this one is at
-                its end or closed; also inside a hook.
-        """
-        wanted = frozenset("signals" if name == "lengths" else name for name in record)
-        for name in wanted - {"outputs", *self._engine.recordable}:
-            known = ["outputs", *self._engine.recordable]
-            raise UnknownNameError("record", name, [self._aliases.get(n, n) for n in known])
-        require_count("chunk", chunk, 1, MOST_STEPS)
-        on_bodies = isinstance(forces, Mapping)
-        drive = check_drive(
-            self,
-            steps=steps,
-            inputs=inputs,
-            offset=offset,
-            gate=gate,
-            forces=None if on_bodies else forces,
-            closed=self._w_out is not None,
-            copies=self._copies,
-        )
-        if isinstance(forces, Mapping):
-            drive = replace(drive, pushes=self._engine.pushes(forces))
-        return self._chunks(drive, wanted, hook, 1 if hook else chunk)
-
     # --- inside ------------------------------------------------------------------------------
-
-    @cached_property
-    def _fingerprint(self) -> float:
-        """48 bits of a hash of the model and the settings, exact as a float."""
-        digest = hashlib.blake2b(self._identity(), digest_size=6).digest()
-        return float(int.from_bytes(digest))
 
     def _identity(self) -> bytes:
         binary = np.zeros(mujoco.mj_sizeModel(self.model), np.uint8)
@@ -433,53 +250,3 @@ class Reservoir(OneDrive):
 
     def _described(self) -> str:
         return "this model"
-
-    def _public(self, array: Array) -> Array:
-        """An engine's array as callers see it: one simulation has no axis of copies."""
-        return array if self._copies is not None else array[0]
-
-    def _chunks(
-        self, drive: Drive, record: frozenset[str], hook: Hook | None, chunk: int
-    ) -> Iterator[Trajectory]:
-        with self._only_drive():
-            self._engine.prepare(drive)
-            for start in range(0, drive.steps, chunk):
-                stop = min(start + chunk, drive.steps)
-                now = self._with_hook(drive, hook, start) if hook else drive
-                try:
-                    chunk_run = self._run(now, record, start, stop)
-                except DivergenceError as error:
-                    raise error.after(start) from None
-                yield chunk_run
-
-    def _with_hook(self, drive: Drive, hook: Hook, step: int) -> Drive:
-        """The drive with the hook's forces for this one step added."""
-        if not callable(hook):
-            raise InvalidArgumentError("hook", "a function (time, signals) -> forces", repr(hook))
-        pushed = hook(self.time, self.signals)
-        forces = as_array("hook's forces", pushed, (self.n_forces,))[None]
-        if drive.forces is not None:
-            row = min(step, drive.forces.shape[-2] - 1)
-            forces = forces + drive.forces[..., row : row + 1, :]
-        return replace(drive, forces=forces)
-
-    def _run(self, drive: Drive, record: frozenset[str], start: int, stop: int) -> Trajectory:
-        done = self._engine.steps_done
-        times = self.timestep * np.arange(done, done + stop - start, dtype=np.float64)
-        measured = record - {"outputs"} | ({"signals"} if "outputs" in record else set())
-        arrays = self._engine.run(drive, tuple(sorted(measured)), start, stop)
-        if "outputs" in record:
-            arrays["outputs"] = self._outputs(arrays["signals"])
-        public = {name: self._public(arrays[name]) for name in record}
-        if "signals" in public:
-            public["lengths"] = public.pop("signals")
-        return Trajectory(times, final_state=self._final_state(), **public)
-
-    def _final_state(self) -> Any:
-        return None
-
-    def _outputs(self, signals: Array) -> Array:
-        """Outputs (copies, T, n_outputs); bits do not depend on the size of the chunks."""
-        if self._w_out is None:
-            return np.zeros((*signals.shape[:-1], self.n_outputs))
-        return self.readout.outputs_by_row(signals)

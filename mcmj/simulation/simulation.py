@@ -23,9 +23,9 @@ from mcmj.utils.errors import InvalidArgumentError
 class Simulation(Reservoir):
     """A body; its state carries over from one rollout to the next.
 
-    A Reservoir whose signals are the lengths (L,) [m] of the springs, and whose `forces` are (N,)
-    or (T, N) horizontal ones on the nodes [N]. It records "lengths", which are its signals,
-    "outputs", "positions" and "velocities".
+    A Reservoir whose signals are the lengths (L,) [m] of the springs, and whose `forces` (N,) or
+    (T, N) act on the nodes along the body's direction [N]. It records "lengths", which are its
+    signals, "outputs", "positions" and "velocities".
 
     Args:
         body: the body.
@@ -110,11 +110,6 @@ class Simulation(Reservoir):
         return tuple(f"in{c}" for c in range(self.body.n_inputs))
 
     @property
-    def late_signals(self) -> tuple[str, ...]:
-        """None: lengths are those of the moment."""
-        return ()
-
-    @property
     def feedback_delay(self) -> int:
         """Steps between a length and the force it feeds back."""
         return self.options.feedback_delay
@@ -172,7 +167,7 @@ class Simulation(Reservoir):
         )
 
     def set_state(self, positions: object = None, velocities: object = None) -> None:
-        """Put the nodes at positions and velocities (N, 2) [m], [m/s]; fixed nodes stay.
+        """Put the nodes at positions and velocities (N, D) [m], [m/s]; fixed nodes stay.
 
         Raises:
             InvalidArgumentError: wrong shape, or NaN.

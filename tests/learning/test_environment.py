@@ -7,6 +7,8 @@ import pytest
 
 pytest.importorskip("dm_control", reason="the extra 'control' is not installed")
 
+from models import CHAIN, CHAIN_PARTS
+
 import mcmj
 from mcmj.core.integrators import INTEGRATORS
 from mcmj.experiments.drive import run as drive
@@ -15,7 +17,9 @@ from mcmj.learning.environments.environment import Setting
 from mcmj.learning.teaching import synchronise
 from mcmj.metrics import orbits
 from mcmj.metrics.orbit_window import OrbitWindow
-from mcmj.utils.errors import InvalidArgumentError, StabilityWarning, UnknownNameError
+from mcmj.targets.limit_cycles import from_array
+from mcmj.targets.named import named_target
+from mcmj.utils.errors import InvalidArgumentError, UnknownNameError
 
 SHORT = Setting(time_limit=0.2)
 
@@ -26,7 +30,13 @@ def one():
     body = mcmj.random_body(1, nodes=8, n_inputs=2, masses=(0.5, 2.0))
     w_out = 0.05 * np.random.default_rng(0).normal(size=(body.n_springs + 1, 2))
     setting = Setting(kick=0.0, time_limit=1.0, input_limit=3.0, offset_limit=2.0)
-    return environment.make(body, w_out, mcmj.target("lissajous"), setting, random=3)
+    simulation = mcmj.Simulation(body, w_out=w_out)
+    return environment.make(simulation, mcmj.target("lissajous"), setting, random=3)
+
+
+def parts(env):
+    """The body and its readout."""
+    return env.physics.reservoir.body, env.physics.reservoir.w_out
 
 
 def actions_of(env, count, seed=0):
@@ -36,15 +46,15 @@ def actions_of(env, count, seed=0):
 
 @pytest.mark.parametrize("integrator", INTEGRATORS)
 def test_the_physics_is_our_closed_loop(one, integrator):
-    physics, setting = one.physics, replace(one.task.setting, integrator=integrator)
-    env = environment.make(physics.body, physics.w_out, one.task.target, setting)
+    body, w_out = parts(one)
+    simulation = mcmj.Simulation(body, w_out=w_out, integrator=integrator)
+    env = environment.make(simulation, one.task.target, one.task.setting)
     actions = actions_of(env, 30)
     steps = [env.reset(), *(env.step(action) for action in actions)]
     held = np.repeat(actions, 20, axis=0)
-    simulation = mcmj.Simulation(physics.body, w_out=physics.w_out, integrator=integrator)
     run = simulation.rollout(inputs=held[:, :2], offset=held[:, 2:])
     end = simulation.rollout(1)
-    seen = np.array([step.observation["lengths"] for step in steps])
+    seen = np.array([step.observation["signals"] for step in steps])
     wanted = np.vstack([run.lengths[::20], end.lengths])
     assert np.array_equal(seen, wanted)
     assert np.abs(wanted - wanted[0]).max() > 0.1  # it did move
@@ -55,29 +65,30 @@ def test_the_physics_is_our_closed_loop(one, integrator):
 @pytest.mark.parametrize("integrator", ["RK4", "leapfrog"])
 def test_an_episode_on_the_cycle_goes_on_under_its_integrator(one, integrator):
     """As a Simulation does that is put there, without action, constant input held."""
-    body, w_out, wanted = one.physics.body, one.physics.w_out, one.task.target
-    setting = replace(one.task.setting, integrator=integrator, start="cycle")
-    env = environment.make(body, w_out, wanted, setting, inputs=[0.3, -0.2])
+    (body, w_out), wanted = parts(one), one.task.target
+    setting = replace(one.task.setting, start="cycle")
+    simulation = mcmj.Simulation(body, w_out=w_out, integrator=integrator)
+    env = environment.make(simulation, wanted, setting, inputs=[0.3, -0.2])
     steps = [env.reset(), *(env.step(np.zeros(4)) for _ in range(10))]
     simulation = mcmj.Simulation(body, integrator=integrator)
     synchronise(simulation, wanted, 20.0, [0.3, -0.2])
     simulation.set_readout(w_out)
-    state = simulation.state
-    simulation.set_state(state.positions, state.velocities)
     run = simulation.rollout(inputs=np.tile([0.3, -0.2], (201, 1)))
-    seen = np.array([step.observation["lengths"] for step in steps])
+    seen = np.array([step.observation["signals"] for step in steps])
     assert np.array_equal(seen, run.lengths[::20])
     assert np.abs(seen - seen[0]).max() > 0.01
 
 
 def test_the_gate_opens_the_loop(one):
-    body, w_out = one.physics.body, one.physics.w_out
+    body, w_out = parts(one)
     open_loop = environment.make(
-        body, w_out, mcmj.target("lissajous"), Setting(kick=0.0, gate=0.0, time_limit=1.0)
+        mcmj.Simulation(body, w_out=w_out),
+        mcmj.target("lissajous"),
+        Setting(kick=0.0, gate=0.0, time_limit=1.0),
     )
     open_loop.reset()
     step = open_loop.step(np.zeros(4))
-    assert np.array_equal(step.observation["lengths"], open_loop.reset().observation["lengths"])
+    assert np.array_equal(step.observation["signals"], open_loop.reset().observation["signals"])
 
 
 def test_actions_are_bounded_in_order_and_clipped(one):
@@ -86,8 +97,8 @@ def test_actions_are_bounded_in_order_and_clipped(one):
     one.reset()
     one.step(100 * spec.maximum)
     assert np.array_equal(one.physics.data.ctrl, spec.maximum)
-    body, w_out = one.physics.body, one.physics.w_out
-    only = environment.make(body, w_out, mcmj.target("lissajous"), Setting(actions="offsets"))
+    simulation = one.physics.reservoir
+    only = environment.make(simulation, mcmj.target("lissajous"), Setting(actions="offsets"))
     assert only.action_spec().shape == (2,)
 
 
@@ -112,8 +123,9 @@ def test_reward_is_1_on_the_cycle_and_small_without_motion():
         step = env.step(np.zeros(2))
     assert step.reward == 1.0
     assert np.abs(step.observation["outputs"] - step.observation["target"]).max() < 0.05
-    body, w_out = env.physics.body, np.zeros_like(env.physics.w_out)
-    still = environment.make(body, w_out, env.task.target, Setting(kick=0.0))
+    body, w_out = parts(env)
+    silent = mcmj.Simulation(body, w_out=0 * w_out)
+    still = environment.make(silent, env.task.target, Setting(kick=0.0))
     still.reset()
     assert still.step(np.zeros(2)).reward == pytest.approx(0.1**0.95**2, rel=0.1)
 
@@ -132,9 +144,10 @@ def test_orbit_window_is_the_orbit_error():
 
 @pytest.mark.parametrize("weight", [1e4, 0.3])  # blows up at once; runs away first
 def test_a_body_that_is_lost_ends_the_episode(one, weight):
-    body = one.physics.body
+    body, _ = parts(one)
     w_out = weight * np.ones((body.n_springs, 2)) * [1.0, -1.0]
-    env = environment.make(body, w_out, mcmj.target("lissajous"), Setting())
+    simulation = mcmj.Simulation(body, w_out=w_out)
+    env = environment.make(simulation, mcmj.target("lissajous"), Setting())
     env.reset()
     step = env.step(np.zeros(4))
     assert (step.last(), step.discount) == (True, 0.0)
@@ -153,18 +166,37 @@ def test_what_does_not_fit_is_said(one):
         Setting(actions="forces")
     with pytest.raises(InvalidArgumentError, match="actions: expected channels"):
         environment.load("quadratic", setting=Setting(actions="inputs"))
-    with pytest.raises(InvalidArgumentError, match="w_out"):
-        environment.make(one.physics.body, np.zeros((3, 2)), mcmj.target("lissajous"))
-    with pytest.raises(UnknownNameError, match="integrator 'Verlet'; valid choices: Euler, RK4, "):
-        Setting(integrator="Verlet")
+    with pytest.raises(InvalidArgumentError, match="reservoir: expected 4 outputs, got 2"):
+        environment.make(one.physics.reservoir, named_target("trot"))
+    simulation, goal = one.physics.reservoir, mcmj.target("lissajous")
     with pytest.raises(InvalidArgumentError, match="control_timestep: expected a multiple of"):
-        Setting(control_timestep=0.0205)
-    body, w_out = one.physics.body, one.physics.w_out
+        environment.make(simulation, goal, Setting(control_timestep=0.0205))
     with pytest.raises(InvalidArgumentError, match="inputs: expected shape \\(2\\)"):
-        environment.make(body, w_out, mcmj.target("lissajous"), inputs=[1.0])
-    coarse = Setting(timestep=0.5, control_timestep=0.5, integrator="leapfrog")
-    with pytest.warns(StabilityWarning, match="integrator leapfrog"):
-        environment.make(body, w_out, mcmj.target("lissajous"), coarse)
+        environment.make(simulation, goal, inputs=[1.0])
+    twin = mcmj.Simulation(simulation.body, w_out=simulation.w_out, engine="twin")
+    with pytest.raises(InvalidArgumentError, match="engine: expected 'mujoco'"):
+        environment.make(twin, goal)
+
+
+@pytest.mark.parametrize("integrator", ["Euler", "RK4", "implicitfast"])
+def test_any_model_is_an_environment(integrator):
+    """Its episodes are its rollouts; the agent acts on an input and on what is fed back."""
+    w_out = np.random.default_rng(0).normal(size=(5, 1)) / 20
+    channels = {"y": {"m1": 1.0, "m2": -0.5}}
+    reservoir = mcmj.Reservoir(
+        CHAIN, sensors=CHAIN_PARTS["sensors"], channels=channels, inputs=["m2"], w_out=w_out,
+        integrator=integrator,
+    )  # fmt: skip
+    goal = from_array("sine", np.sin(np.linspace(0, 6.28, 100))[:, None], 0.01)
+    env = environment.make(reservoir, goal, Setting(kick=0.0, time_limit=1.0))
+    actions = 0.1 * actions_of(env, 30)
+    steps = [env.reset(), *(env.step(action) for action in actions)]
+    held = np.repeat(actions, 10, axis=0)
+    run = reservoir.rollout(inputs=held[:, :1], offset=held[:, 1:])
+    seen = np.array([step.observation["signals"] for step in steps])
+    wanted = np.vstack([run.signals[::10], reservoir.signals])
+    assert np.array_equal(seen, wanted)
+    assert np.abs(wanted[-1]).max() > 0.1
 
 
 def test_the_cross_entropy_method_finds_better_inputs():

@@ -9,6 +9,7 @@ import twins
 import mcmj
 from mcmj import Simulation, Teaching, fit_readout, teach
 from mcmj.learning import teaching
+from mcmj.learning.lessons import Lesson
 from mcmj.learning.teaching import synchronise
 from mcmj.metrics.orbits import orbit_error
 from mcmj.targets.limit_cycles import from_array, target
@@ -49,6 +50,22 @@ def test_fit_is_the_regression_of_the_clean_target_on_the_driven_lengths(body, g
     assert fit.train_nrmse == pytest.approx(nrmse, rel=1e-6)
     assert fit.rows == steps - washout
     assert fit.w_out.shape == (n + bias, 2)
+
+
+def test_some_outputs_may_be_fed_back_without_noise(body, goal):
+    """As by hand, with the noise stream; and the wrong number of shares is named."""
+    settings = Teaching(duration=3.0, washout=1.0, noise=0.1)
+    course = teaching.Course(Simulation(body, timestep=STEP), settings, 3)
+    course.attend(Lesson(goal.sample, 3.0, 1.0, noise_share=(1.0, 0.0)))
+    clean = goal.sample(STEP * np.arange(1500))
+    noisy = clean.copy()
+    noisy[:, 0] += 0.1 * stream(3, "teacher_noise").standard_normal(1500)
+    run = Simulation(body, timestep=STEP).rollout(offset=noisy)
+    w = fit_readout(run.lengths[500:], clean[500:], 1e-6 * 1000)
+    assert np.abs(course.regression.solve(ridge=1e-6 * 1000).w_out - w).max() < 1e-9
+    for share in ((1.0, 0.0, 1.0), (-1.0, 0.0)):
+        with pytest.raises(InvalidArgumentError, match="noise_share: expected"):
+            course.attend(Lesson(goal.sample, 3.0, noise_share=share))
 
 
 def test_same_seed_same_bits(body, goal):

@@ -30,9 +30,10 @@ def reals(low, high):
 
 @st.composite
 def bodies(draw):
-    """Any valid body: a random tree of springs and some more, any numbers, any fixed nodes."""
-    n = draw(st.integers(2, 6))
-    positions = draw(arrays(float, (n, 2), elements=reals(-1e5, 1e5), unique=True))
+    """Any valid body, in the plane or in space: a random tree of springs and some more, any
+    numbers, any fixed nodes, pushed along any direction."""
+    n, dimensions = draw(st.integers(2, 6)), draw(st.sampled_from([2, 3]))
+    positions = draw(arrays(float, (n, dimensions), elements=reals(-1e5, 1e5), unique=True))
     tree = {(draw(st.integers(0, i - 1)), i) for i in range(1, n)}
     pairs = st.tuples(st.integers(0, n - 1), st.integers(0, n - 1))
     more = {tuple(sorted(p)) for p in draw(st.sets(pairs, max_size=4)) if p[0] != p[1]}
@@ -55,7 +56,12 @@ def bodies(draw):
         d1=draw(arrays(float, len(springs), elements=positive)),
         k3=draw(arrays(float, len(springs), elements=from_zero)),
         d3=draw(arrays(float, len(springs), elements=from_zero)),
+        direction=draw(st.none() | directions(dimensions)),
     )
+
+
+def directions(dimensions):
+    return arrays(float, dimensions, elements=st.one_of(st.just(0.0), reals(-9, 9))).filter(any)
 
 
 def readouts(body, rows):

@@ -8,14 +8,18 @@ from pathlib import Path
 import imageio_ffmpeg
 import numpy as np
 import pytest
+from models import CHAIN, CHAIN_PARTS
 from PIL import Image
 
 import mcmj
 from mcmj.experiments.render import run as render
 from mcmj.mjcf.appearance import frame, node_colour
-from mcmj.pictures.film import Film, Window, deformation_scale, strains
+from mcmj.pictures.film import Film, ModelFilm, Window, deformation_scale, strains
 from mcmj.pictures.film_figure import FilmFigure
+from mcmj.pictures.film_of import film as write_film_of
+from mcmj.pictures.film_of import film_of
 from mcmj.pictures.flat_view import FlatView
+from mcmj.pictures.model_view import BAND
 from mcmj.pictures.opengl import RenderingUnavailableError
 from mcmj.pictures.opengl_view import GLView
 from mcmj.pictures.rendering import (
@@ -247,3 +251,25 @@ def test_a_disturbed_film_marks_what_happened():
     assert np.abs(pushed[:1000]).max() < 1e-12
     assert np.ptp(pushed[inside], axis=0).max() < 1e-12
     assert 2.5 < np.abs(pushed[inside]).max() <= 5.0
+
+
+def test_a_film_of_any_model_shows_it_and_its_outputs(tmp_path):
+    w_out = np.random.default_rng(0).normal(size=(5, 2)) / 50
+    reservoir = mcmj.Reservoir(CHAIN, **CHAIN_PARTS, w_out=w_out)
+    reservoir.set_state(qvel=[10.0, -20.0])
+    recorded = film_of(reservoir, 1.0)
+    assert isinstance(recorded, ModelFilm)
+    assert recorded.qpos.shape == (500, 2)
+    try:
+        frames = list(film_frames(recorded))
+    except RenderingUnavailableError:
+        pytest.skip("no OpenGL here")
+    assert len(frames) == 25
+    model = np.stack(frames)[:, BAND:-BAND, :WIDTH].astype(int)
+    moved = np.abs(np.diff(model, axis=0)).max(axis=-1) > 10
+    assert moved.any(axis=(1, 2)).all()  # the chain moves in every picture
+    assert (np.stack(frames)[:, :BAND, :WIDTH] > 200).mean() > 0.9
+    write_film_of(reservoir, tmp_path / "chain.gif", 0.2)
+    assert (tmp_path / "chain.gif").stat().st_size > 1000
+    with pytest.raises(UnknownNameError, match="unknown camera 'no'"):
+        film_of(reservoir, 0.1, camera="no")

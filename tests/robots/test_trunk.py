@@ -1,16 +1,14 @@
 """A trunk that is the computer: momentum, weight, and a loop closed by nothing but springs."""
 
-import mujoco
 import numpy as np
 import pytest
 
-from mcmj.core.callbacks import install
 from mcmj.experiments.trunk.result import forward_speed
+from mcmj.learning.force_learning import ForceLearning, force_learn
 from mcmj.metrics.orbits import orbit_error
-from mcmj.robots.force_learning import ForceLearning, force_learn
 from mcmj.robots.quadruped import GRAVITY
 from mcmj.robots.trunk import N_MUSCLES, TrunkSettings, draw_trunk, muscle_lengths, muscle_target
-from mcmj.robots.trunk_walker import TrunkWalker
+from mcmj.robots.trunk_walker import has_fallen, new_robot, stand, walk
 from mcmj.robots.walk_metrics import fall_times, speeds
 from mcmj.targets.gaits import LEGS, POINTS, gait_target
 from mcmj.utils.errors import InvalidArgumentError
@@ -27,30 +25,24 @@ def lively(trunk):
     return 0.3 * np.random.default_rng(1).normal(size=(trunk.n_sensed + 1, N_MUSCLES))
 
 
-def nodes_of(trunk, walk):
+def nodes_of(trunk, walked):
     """Positions (T, N, 2) of all nodes."""
-    return trunk.body.positions + walk.joints[0].reshape(len(walk.times), -1, 2)
+    return trunk.body.positions + walked.joints[0].reshape(len(walked.times), -1, 2)
 
 
-def in_flight(trunk, readout, timestep):
-    walker = TrunkWalker(trunk, timestep=timestep, ground=False)
-    walker.set_readout(readout)
-    walker.close(True)
-    return walker.walk(0.4, sample=4e-3, joints=True)
+def flying(trunk, readout, timestep=1e-3):
+    robot = new_robot(trunk, timestep=timestep, ground=False)
+    robot.set_readout(readout)
+    return robot
 
 
-def angular_momenta(trunk, readout, timestep):
-    """About the centre of mass (40,), every 10 ms of a free fall, from MuJoCo's state."""
-    walker = TrunkWalker(trunk, timestep=timestep, ground=False)
-    walker.set_readout(readout)
-    walker.close(True)
-    data, masses = mujoco.MjData(walker.model), trunk.body.masses[:, None]
-    found = []
+def angular_momenta(trunk, robot):
+    """About the centre of mass (40,), every 10 ms of a free fall."""
+    masses, found = trunk.body.masses[:, None], []
     for _ in range(40):
-        walker.advance(round(0.01 / timestep))
-        mujoco.mj_setState(walker.model, data, walker.state, mujoco.mjtState.mjSTATE_INTEGRATION)
-        place = trunk.body.positions + data.qpos.reshape(-1, 2)
-        speed = data.qvel.reshape(-1, 2)
+        robot.rollout(round(0.01 / robot.timestep), record=())
+        place = trunk.body.positions + robot.qpos.reshape(-1, 2)
+        speed = robot.qvel.reshape(-1, 2)
         apart, rate = (v - (masses * v).sum(axis=0) / trunk.mass for v in (place, speed))
         turning = apart[:, 0] * rate[:, 1] - apart[:, 1] * rate[:, 0]
         found.append(trunk.body.masses @ turning)
@@ -58,41 +50,46 @@ def angular_momenta(trunk, readout, timestep):
 
 
 def test_in_free_fall_muscles_move_the_body_but_not_its_centre(trunk, lively):
-    walk = in_flight(trunk, lively, 1e-3)
-    nodes, step = nodes_of(trunk, walk), 1e-3
+    walked = walk(flying(trunk, lively), trunk, 0.4, sample=4e-3)
+    nodes, step = nodes_of(trunk, walked), 1e-3
     centre = (trunk.body.masses[:, None] * nodes).sum(axis=1) / trunk.mass
-    fall = -GRAVITY * walk.times * (walk.times + step) / 2  # semi-implicit, exactly
+    fall = -GRAVITY * walked.times * (walked.times + step) / 2  # semi-implicit, exactly
     # the discrete integrator's equations are solved to some 1e-8
     assert np.abs(centre[:, 0] - centre[0, 0]).max() < 4e-8
     assert np.abs(centre[:, 1] - centre[0, 1] - (fall - fall[0])).max() < 4e-8
-    assert np.abs(walk.outputs).max() > 0.01
+    assert np.abs(walked.outputs).max() > 0.01
     assert np.abs(nodes - centre[:, None] - (nodes[0] - centre[0])).max() > 0.01
 
 
 def test_in_free_fall_angular_momentum_is_kept(trunk, lively):
     """No joint and no actuator turns against the world."""
-    assert np.ptp(angular_momenta(trunk, lively, 1e-3)) < 6e-7  # kg m^2/s; solved to some 1e-8
+    assert (
+        np.ptp(angular_momenta(trunk, flying(trunk, lively))) < 6e-7
+    )  # kg m^2/s; solved to some 1e-8
 
 
-@pytest.mark.parametrize("sample", [0.01, 0.03, 0.25])
-def test_a_push_gives_its_impulse_and_is_over(trunk, sample):
-    walker = TrunkWalker(trunk, ground=False)
-    walker.walk(0.5, push=10.0, sample=sample)
-    data = mujoco.MjData(walker.model)
-    mujoco.mj_setState(walker.model, data, walker.state, mujoco.mjtState.mjSTATE_INTEGRATION)
-    momentum = trunk.body.masses @ data.qvel[::2]
-    assert momentum == pytest.approx(10.0, rel=1e-5)
-    assert not data.qfrc_applied.any()
+@pytest.mark.parametrize("timestep", [1e-3, 7e-4])
+def test_a_push_gives_its_impulse_and_is_over(trunk, timestep):
+    robot = new_robot(trunk, timestep=timestep, ground=False)
+    for impulse in (10.0, 0.0):
+        walk(robot, trunk, 0.5, push=impulse)
+        assert trunk.body.masses @ robot.qvel[::2] == pytest.approx(10.0, rel=1e-5)
 
 
 def test_standing_the_feet_bear_the_weight(trunk):
-    walker = TrunkWalker(trunk)
-    walker.stand()
-    walk = walker.walk(8.0)
-    load = walk.contact[0, -1]
+    robot = new_robot(trunk)
+    stand(robot)
+    walked = walk(robot, trunk, 8.0)
+    load = walked.contact[0, -1]
     assert load.sum() == pytest.approx(trunk.mass * GRAVITY, rel=1e-6)
     assert (load > 0).all()
-    assert speeds(walk)[0] < 1e-3
+    assert speeds(walked)[0] < 1e-3
+    assert not has_fallen(trunk)(robot.rollout(10, record=("qpos",)))
+
+
+def test_a_robot_without_ground_has_fallen(trunk):
+    robot = new_robot(trunk, ground=False)
+    assert has_fallen(trunk)(robot.rollout(1000, record=("qpos",)))
 
 
 def test_muscles_of_these_lengths_meet_where_the_foot_is_wanted(trunk):
@@ -119,38 +116,31 @@ def test_muscles_of_these_lengths_meet_where_the_foot_is_wanted(trunk):
 
 def test_the_muscles_hear_of_nothing_but_the_trunks_springs(trunk, lively):
     """Commands from positions in NumPy, and their forces, against MuJoCo's."""
-    walker = TrunkWalker(trunk)
-    walker.stand()
-    walker.set_readout(0.1 * lively)
-    walker.close(True)
-    walk = walker.walk(0.5, joints=True)
-    nodes, n = nodes_of(trunk, walk), trunk.n_sensed
-    ends = nodes[:, trunk.body.springs[:n]]
-    strain = np.linalg.norm(ends[:, :, 1] - ends[:, :, 0], axis=-1) - trunk.body.rest_lengths[:n]
-    commands = np.column_stack([strain, np.ones(len(strain))]) @ (0.1 * lively)
-    assert np.abs(walk.outputs[0] - commands).max() < 1e-13
+    robot, n = new_robot(trunk), trunk.n_sensed
+    stand(robot)
+    readout = 0.1 * lively
+    readout[n] -= trunk.body.rest_lengths[:n] @ readout[:n]
+    robot.set_readout(readout)
+    walked = walk(robot, trunk, 0.5, sample=1e-3)
+    ends = nodes_of(trunk, walked)[:, trunk.body.springs]
+    lengths = np.linalg.norm(ends[:, :, 1] - ends[:, :, 0], axis=-1)
+    commands = np.column_stack([lengths[:, :n], np.ones(len(lengths))]) @ readout
+    assert np.abs(walked.outputs[0] - commands).max() < 1e-13
     assert np.ptp(commands, axis=0).max() > 1e-4
-    walker.advance(1)
-    force = walker.model.actuator("m0"), walker._batch.bind("actuator_force")[0]
-    assert force[1] == pytest.approx(trunk.settings.muscle_stiffness * commands[-1], rel=1e-12)
+    force = trunk.settings.muscle_stiffness * commands
+    rate = np.diff(lengths[:, n:], axis=0) / 1e-3  # speeds move the nodes in the step before
+    power = np.maximum(force[1:] * rate, 0.0).sum(axis=1)
+    assert np.abs(force).max() < trunk.settings.muscle_strength
+    assert np.abs(walked.power[0, 1:] - power).max() < 1e-3 * power.max()
 
 
-def test_a_state_is_restored_bit_for_bit_and_a_seed_gives_the_same_robot(trunk, lively):
+def test_a_seed_gives_the_same_robot_and_walk(trunk, lively):
     ends = []
     for _ in range(2):
-        walker = TrunkWalker(draw_trunk(3))
-        walker.stand()
-        walker.set_readout(0.1 * lively)
-        walker.close(True)
-        state = walker.state
-        heard = walker.features()
-        first = walker.walk(0.2, joints=True)
-        assert not np.array_equal(walker.features(), heard)
-        walker.restore(state)
-        assert np.array_equal(walker.features(), heard)
-        again = walker.walk(0.2, joints=True)
-        assert np.array_equal(first.joints, again.joints)
-        ends.append(first.joints)
+        robot = new_robot(draw_trunk(3))
+        stand(robot)
+        robot.set_readout(0.1 * lively)
+        ends.append(walk(robot, trunk, 0.2).joints)
     assert np.array_equal(*ends)
     assert not np.array_equal(draw_trunk(4).body.positions, trunk.body.positions)
 
@@ -178,37 +168,26 @@ def test_settings_name_what_is_wrong(change):
 
 def test_leapfrog_is_refused(trunk):
     with pytest.raises(InvalidArgumentError, match="integrator: expected one of MuJoCo's"):
-        TrunkWalker(trunk, integrator="leapfrog")
+        new_robot(trunk, integrator="leapfrog")
 
 
 @pytest.mark.slow
 def test_it_learns_to_trot_starts_from_rest_and_does_not_depend_on_the_step():
     trunk = draw_trunk(1)
-    target, walker = muscle_target(trunk, "trot", 11.0), TrunkWalker(trunk)
-    learned = force_learn(walker, target, ForceLearning(rounds=1), seed=1)
+    target, robot = muscle_target(trunk, "trot", 11.0), new_robot(trunk)
+    learned = force_learn(
+        robot, target, ForceLearning(rounds=1), seed=1,
+        stand=lambda: stand(robot), failed=has_fallen(trunk),
+    )  # fmt: skip
     errors, paces = [], []
     for timestep in (1e-3, 5e-4):
-        other = TrunkWalker(trunk, timestep=timestep)
+        other = new_robot(trunk, timestep=timestep)
         other.set_readout(learned.w_out)
-        other.stand()
-        other.close(True)
-        walk = other.walk(20.0)
-        assert np.isinf(fall_times(walk, trunk.settings.leg)).all()
-        errors.append(orbit_error(walk.after(14.0).outputs[0], target))
-        paces.append(forward_speed(walk.after(14.0)))
+        stand(other)
+        walked = walk(other, trunk, 20.0)
+        assert np.isinf(fall_times(walked, trunk.settings.leg)).all()
+        errors.append(orbit_error(walked.after(14.0).outputs[0], target))
+        paces.append(forward_speed(walked.after(14.0)))
     assert max(errors) < 0.1
     assert min(paces) > 0.6
     assert paces[1] == pytest.approx(paces[0], rel=0.03)
-
-
-def test_a_walker_installs_callbacks_that_were_taken_out(trunk, lively):
-    def outputs(spoil):
-        walker = TrunkWalker(trunk, ground=False)
-        walker.set_readout(lively)
-        walker.close(True)
-        spoil()
-        walker.advance(100)
-        spoil()
-        return walker.walk(0.1).outputs
-
-    assert outputs(install.uninstall).tobytes() == outputs(lambda: None).tobytes()

@@ -6,7 +6,6 @@ import mujoco
 import numpy as np
 import pytest
 
-from mcmj.core.callbacks import install
 from mcmj.experiments.walk.config import Config
 from mcmj.experiments.walk.recover import distances_from, recovery
 from mcmj.mjcf.bundled import body_path
@@ -14,7 +13,8 @@ from mcmj.mjcf.read import body_of_model, load_model, readouts_of_model
 from mcmj.pictures.walk_video import BAR, MARK, Event, GaitDiagram
 from mcmj.robots.ground_training import teach_on_ground
 from mcmj.robots.leg_readouts import LegReadout, lift_of, teach_lift
-from mcmj.robots.quadruped import Quadruped, Stride
+from mcmj.robots.quadruped import Quadruped
+from mcmj.robots.rescale import SIZE, rescaled
 from mcmj.robots.walk_metrics import (
     Walk,
     costs_of_transport,
@@ -24,7 +24,7 @@ from mcmj.robots.walk_metrics import (
     stride_period,
     turns,
 )
-from mcmj.robots.walk_scene import Terrain
+from mcmj.robots.walk_scene import Terrain, walking_model
 from mcmj.robots.walker import Walker
 from mcmj.simulation.simulation import Simulation
 from mcmj.targets.gaits import LEGS, gait_target
@@ -52,36 +52,78 @@ def started(body, gait, **options):
     return walker
 
 
+def alone_in(body, gait):
+    """The body without a robot, in the units it was taught in, where a walker starts."""
+    w_out = gait.w_out[:, : len(LEGS)].copy()
+    w_out[:-1] *= SIZE
+    alone = Simulation(body, w_out=w_out)
+    state = np.zeros((2, body.n_nodes, 2))
+    state[:, body.free] = gait.start.reshape(2, -1, 2)
+    alone.set_state(body.positions + state[0] / SIZE, state[1] / (8 * SIZE))
+    return alone
+
+
 def test_the_robot_walks_and_the_body_does_not_know(body, trot):
     """Without coupling the outputs are those of the body alone, pace times faster."""
     walker = started(body, trot)
     walk = walker.walk(2.5)
     assert np.isinf(fall_times(walk, ROBOT.leg)).all()
     assert walk.trunk[0, -1, 0] - walk.trunk[0, 0, 0] > 2.0
-    alone = Simulation(body, w_out=trot.swing)
-    alone.set_state(trot.start.positions, trot.start.velocities)
     steps = round(walk.sample / walker.timestep)
-    outputs = alone.rollout(len(walk.times) * steps + 1, record=("outputs",)).outputs
-    assert np.abs(walk.outputs[0] - outputs[steps::steps]).max() < 1e-11
+    alone = alone_in(body, trot).rollout(len(walk.times) * steps, record=("outputs",))
+    assert np.abs(walk.outputs[0] - alone.outputs[::steps]).max() < 7e-13
 
 
-def test_a_robot_installs_callbacks_that_were_taken_out(body, trot):
-    def joints(spoil):
-        walker = started(body, trot)
-        spoil()
-        walker.advance(1000)
-        spoil()
-        return walker.walk(0.2, joints=True).joints
+def test_a_walk_agrees_with_a_plain_loop(body, trot):
+    """The law by hand, in the scene without its actuators' own; both with the load in the body."""
+    coupling, load, steps = 0.4, 20.0, 4000
+    walker = started(body, trot, coupling=coupling, terrain=Terrain(load=load))
+    walk = walker.walk(steps * walker.timestep, sample=walker.timestep, joints=True)
+    spec = walking_model(rescaled(body, pace=8.0, size=SIZE), ROBOT, Terrain(load=load), 0.0)
+    spec.option.timestep = walker.timestep
+    model = spec.compile()
+    data = mujoco.MjData(model)
+    n = trot.start.shape[1]
+    data.qpos[:n], data.qvel[:n] = trot.start
+    places = model.jnt_qposadr, model.jnt_dofadr
+    at, dof = ([p[model.joint(f"robot/{leg}_leg").id] for leg in LEGS] for p in places)
+    ids = [
+        [model.actuator(name.format(i=i, leg=leg)).id for i, leg in enumerate(LEGS)]
+        for name in ("fb{i}", "robot/{leg}_hip", "robot/{leg}_leg", "in{i}")
+    ]
+    outputs, joints, power, contact = [], [], [], []
+    for _ in range(steps):
+        mujoco.mj_fwdPosition(model, data)
+        told = data.ten_length[: body.n_springs] @ trot.w_out[:-1] + trot.w_out[-1]
+        qpos, qvel = data.qpos.copy(), data.qvel.copy()
+        borne = ROBOT.leg_stiffness * (qpos[at] - told[8:]) + ROBOT.leg_damping * qvel[dof]
+        data.ctrl[np.ravel(ids)] = np.r_[told, coupling * borne / (9.81 * ROBOT.mass)]
+        mujoco.mj_step(model, data)
+        outputs.append(told[:4])
+        joints.append(qpos)
+        power.append(np.maximum(data.qfrc_actuator * qvel, 0.0)[n + 6 :].sum())
+        contact.append([data.sensor(f"robot/{leg}_contact").data[0] for leg in LEGS])
+    assert np.max(np.abs(borne)) > 100.0
+    assert np.abs(walk.outputs[0] - outputs).max() < 1e-12
+    assert np.abs(walk.joints[0] - joints).max() < 2e-14
+    assert np.abs(walk.power[0] - power).max() < 1e-12 * np.max(power)
+    assert np.abs(walk.contact[0] - contact).max() < 1e-12 * np.max(contact)
 
-    assert joints(install.uninstall).tobytes() == joints(lambda: None).tobytes()
 
-
-@pytest.mark.parametrize("damage", ["cut_springs", "freeze"])
+@pytest.mark.parametrize("damage", ["cut", "frozen"])
 def test_without_the_bodys_springs_the_legs_stop(body, trot, damage):
     """No trajectory is replayed."""
     walker = started(body, trot)
     walker.walk(1.0)
-    getattr(walker, damage)()
+    if damage == "cut":  # broken springs measure nothing
+        walker.alter(cut=[f"s{j}" for j in range(body.n_springs)])
+        nothing, bias = np.zeros((len(trot.w_out), 4)), np.eye(len(trot.w_out))[:, -1:]
+        walker.set_readout(trot.stride.commands(nothing, nothing, bias))
+    else:
+        walker.alter(masses={f"n{i}": 1e15 for i in body.free})
+        qvel = walker.qvel
+        qvel[: walker.motion.shape[-1]] = 0.0
+        walker.set_state(qvel=qvel)
     walker.walk(2.5)
     walk = walker.walk(0.5, joints=True)
     hips = walk.joints[0][:, -2 * len(LEGS) :: 2]
@@ -102,39 +144,24 @@ def test_the_ground_changes_the_rhythm_only_if_coupled(body, trot):
     assert np.abs(runs[-0.4, 0.0] - runs[-0.4, 50.0]).max() > 0.01
 
 
-def test_what_enters_the_body_is_the_load_on_the_servos(body, trot):
-    """u_i = g F_i / (M gravity), F_i minus the force of the leg's two actuators."""
-    walker = started(body, trot, coupling=0.4, terrain=Terrain(load=20.0))
-    forces = walker._batch.bind("actuator_force")
-    walker.advance(8000)
-    force = {walker.model.actuator(i).name: f for i, f in enumerate(forces[0])}
-    heard = [force[f"in{i}"] for i in range(len(LEGS))]
-    borne = [-force[f"robot/{leg}_lift"] - force[f"robot/{leg}_leg_servo"] for leg in LEGS]
-    assert np.abs(borne).max() > 100.0
-    assert heard == pytest.approx(0.4 * np.array(borne) / (9.81 * ROBOT.mass), rel=1e-9, abs=1e-12)
-
-
 def test_a_teacher_leads_body_and_legs(body, trot):
     """The body as under teacher forcing without a robot; the legs where the teacher says."""
     walker = started(body, trot)
     target, steps = gait_target("trot"), 2000
     positions = target.sample(1e-3 * np.arange(steps))
-    noise = 0.2 * np.random.default_rng(0).standard_normal((steps, len(LEGS)))
-    told = np.hstack([positions, lift_of(positions)])
-    lengths = walker.led(told[None], noise[None])[0]
-    alone = Simulation(body, w_out=trot.swing)
-    alone.set_state(trot.start.positions, trot.start.velocities)
-    wanted = alone.rollout(steps, offset=positions + noise, gate=np.zeros(len(LEGS)))
-    assert np.abs(lengths - wanted.get("lengths")).max() < 1e-11
-    state = walker.body_state()
-    assert np.abs(state.positions - alone.state.positions).max() < 1e-11
-    assert np.abs(state.velocities - alone.state.velocities).max() < 1e-11
-    still = np.tile([0.5, 0.5, -0.5, -0.5, 0.0, 0.0, 0.0, 0.0], (1, 8000, 1))
-    walker.led(still, 0 * still[..., :4])
-    hips = walker.walk(1e-3, sample=1e-3, joints=True).joints[0, -1, -2 * len(LEGS) :: 2]
-    stride = trot.stride
-    wanted = stride.of_legs("swing") * still[0, 0, :4] + stride.of_legs("lean")
-    assert hips == pytest.approx(wanted, abs=0.02)  # the load bends the servos
+    told = trot.stride.commands(positions, lift_of(positions))
+    run = walker.rollout(offset=told, gate=0.0)
+    alone = alone_in(body, trot)
+    wanted = alone.rollout(steps, offset=positions, gate=0.0)
+    assert np.abs(run.signals / SIZE - wanted.get("lengths")).max() < 1e-13  # 0 here
+    moved, speed = walker.motion
+    free, state = body.free, alone.state
+    assert np.abs(moved / SIZE - (state.positions - body.positions)[free].ravel()).max() < 1e-12
+    assert np.abs(speed / (8 * SIZE) - state.velocities[free].ravel()).max() < 1e-12
+    still = trot.stride.commands(np.array([[0.5, 0.5, -0.5, -0.5]]), np.zeros((1, 4)))
+    run = walker.rollout(offset=np.tile(still, (8000, 1)), gate=0.0, record=("qpos",))
+    hips = run.qpos[-1, -2 * len(LEGS) :: 2]
+    assert hips == pytest.approx(still[0, 4:8], abs=0.02)  # the load bends the servos
 
 
 def test_a_body_taught_on_the_ground_keeps_the_targets_pace(body, trot):
@@ -153,46 +180,56 @@ def test_a_body_taught_on_the_ground_keeps_the_targets_pace(body, trot):
     assert periods[1] == pytest.approx(wanted, rel=0.003)
 
 
-def test_robots_put_back_on_their_feet(body, trot):
+def test_robots_begin_on_their_feet_with_bodies_in_motion(body, trot):
     walker = started(body, trot)
-    first = walker.snapshot()
+    n, first = trot.start.shape[1], walker.qpos
     walker.walk(0.5)
-    before = walker.body_state()
-    walker.stand()
-    assert np.array_equal(walker.body_state().positions, before.positions)
-    assert np.array_equal(walker.body_state().velocities, before.velocities)
-    robot = np.arange(walker._nodes, walker.model.nq) + 1  # the state begins with the time
-    assert np.array_equal(walker.snapshot()[0, robot], first[0, robot])
+    motion = walker.motion
+    two = Walker(body, ROBOT, copies=2)
+    two.start(trot, np.array([trot.start, motion]))
+    assert np.array_equal(two.motion, [trot.start, motion])
+    assert np.array_equal(two.qpos[:, n:], np.tile(first[n:], (2, 1)))
+    assert not two.qvel[:, n:].any()
 
 
-def test_copies_and_repeats_give_the_same_bits(body, trot):
-    one = started(body, trot, coupling=-0.4).walk(0.6)
-    two = started(body, trot, coupling=-0.4, copies=2).walk(0.6)
-    for copy in (0, 1):
-        assert np.array_equal(two.trunk[copy], one.trunk[0])
-        assert np.array_equal(two.outputs[copy], one.outputs[0])
+def test_copies_and_states_put_back_give_the_same_bits(body, trot):
+    one = started(body, trot, coupling=-0.4)
+    first = one.walk(0.3)
+    state = one.snapshot()
+    rest = one.walk(0.3)
+    two = started(body, trot, coupling=-0.4, copies=2)
+    for walk in (first, rest):
+        both = two.walk(0.3)
+        for copy in (0, 1):
+            assert np.array_equal(both.trunk[copy], walk.trunk[0])
+            assert np.array_equal(both.outputs[copy], walk.outputs[0])
+    two.restore(np.vstack([state, state]))
+    assert np.array_equal(two.walk(0.3).trunk[1], rest.trunk[0])
 
 
 def test_a_push_changes_the_momentum_by_its_impulse(body, trot):
     """In free fall: m dv = impulse, whatever the legs do."""
     walker = started(body, trot, copies=2)
-    walker._batch.bind("qpos")[:, walker._nodes + 2] += 50.0
+    qpos = walker.qpos
+    qpos[:, trot.start.shape[1] + 2] += 50.0
+    walker.set_state(qpos)
     impulse = 30.0
     walker.walk(0.2, push=[[0.0, 0.0], [0.0, impulse]])
-    momenta = []
+    model, momenta = walker.model, []
     for copy in (0, 1):
-        data = walker._batch.get_data(copy)
-        mujoco.mj_forward(walker.model, data)
-        mujoco.mj_subtreeVel(walker.model, data)
-        momenta.append(walker.mass * data.subtree_linvel[walker.model.body("robot/trunk").id])
+        data = mujoco.MjData(model)
+        data.qpos[:], data.qvel[:] = walker.qpos[copy], walker.qvel[copy]
+        mujoco.mj_forward(model, data)
+        mujoco.mj_subtreeVel(model, data)
+        momenta.append(ROBOT.mass * data.subtree_linvel[model.body("robot/trunk").id])
     assert np.abs(momenta[1] - momenta[0] - [0.0, impulse, 0.0]).max() < 1e-5 * impulse
 
 
 def test_a_standing_robot_bears_its_weight(body, trot):
-    still = LegReadout(0 * trot.swing, 0 * trot.lift, trot.start, Stride(lean=(0.0, 0.0)))
-    walker = started(body, still)
+    walker = started(body, LegReadout(0 * trot.w_out, trot.start, trot.stride))
     walker.walk(3.0)
-    assert walker.walk(0.1).contact[0, -1].sum() == pytest.approx(9.81 * walker.mass, rel=1e-3)
+    weight = 9.81 * ROBOT.mass
+    assert walker.walk(0.1).contact[0, -1].sum() == pytest.approx(weight, rel=1e-3)
 
 
 def made_up(trunk, **arrays):
@@ -272,5 +309,5 @@ def test_errors_name_the_argument(body):
         Config(parts=("adapt",), after=1.0)
     with pytest.raises(InvalidArgumentError, match="leg: expected"):
         Quadruped(leg=-1.0)
-    with pytest.raises(InvalidArgumentError, match="body: expected 4 inputs and outputs"):
+    with pytest.raises(InvalidArgumentError, match="body: expected 4 feedback channels"):
         Walker(replace(body, w_fb=body.w_fb[:, :2]), ROBOT)

@@ -9,11 +9,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from models import CHAIN, CHAIN_PARTS
 
 import mcmj
 from mcmj.experiments.view.run import Config, run
 from mcmj.metrics import orbits
-from mcmj.pictures.viewer import NoDisplayError, shown_model
+from mcmj.pictures.window.body_viewer import shown_model
+from mcmj.pictures.window.viewer import NoDisplayError
 from mcmj.simulation.interactive import LiveLoop
 from mcmj.utils.errors import InvalidArgumentError, UnknownNameError
 
@@ -22,18 +24,34 @@ SCRIPT = Path(__file__).parents[2] / "scripts" / "view.py"
 
 @pytest.fixture
 def loop(body, w_out, w_bias):
-    return LiveLoop(body, {"plain": w_out, "biased": w_bias})
+    return LiveLoop(mcmj.Simulation(body), {"plain": w_out, "biased": w_bias})
+
+
+def positions(loop):
+    """Of the nodes now (N, 2)."""
+    body = loop.reservoir.body
+    found = body.positions.copy()
+    found[body.free] += loop.data.qpos.reshape(-1, 2)
+    return found
+
+
+def pushes(loop, forces):
+    """Forces (N, 2) on the nodes as (n_bodies, 6)."""
+    found = np.zeros((loop.model.nbody, 6))
+    for node in loop.reservoir.body.free:
+        found[loop.model.body(f"n{node}").id, :2] = forces[node]
+    return found
 
 
 def test_it_is_the_closed_loop(loop, body, w_out, w_bias):
     simulation = mcmj.Simulation(body, w_out=w_out)
     loop.advance(700)
-    assert np.abs(loop.positions - simulation.rollout(700).final_state.positions).max() < 1e-12
+    assert np.abs(positions(loop) - simulation.rollout(700).final_state.positions).max() < 1e-12
     loop.switch_next()
     assert loop.readout == "biased"
     simulation.set_readout(w_bias)
     loop.advance(500)
-    assert np.abs(loop.positions - simulation.rollout(500).final_state.positions).max() < 1e-12
+    assert np.abs(positions(loop) - simulation.rollout(500).final_state.positions).max() < 1e-12
     outputs = simulation.rollout(1).outputs[0]
     assert np.abs(loop.outputs - outputs).max() < 1e-12
     assert loop.time == pytest.approx(1.2)
@@ -53,27 +71,51 @@ def test_freezing_is_that_of_a_schedule(loop, body, w_out):
     loop.advance(1)
     loop.freeze(1)
     loop.advance(300)
-    assert np.abs(loop.positions - simulation.state.positions).max() < 1e-12
+    assert np.abs(positions(loop) - simulation.state.positions).max() < 1e-12
 
 
 def test_forces_and_kicks_move_the_nodes(loop, body, w_out):
     horizontal = np.zeros((body.n_nodes, 2))
     horizontal[:, 0] = np.arange(body.n_nodes)
-    loop.advance(200, horizontal)
+    loop.advance(200, pushes(loop, horizontal))
     run = mcmj.Simulation(body, w_out=w_out).rollout(200, forces=horizontal[:, 0])
-    assert np.abs(loop.positions - run.final_state.positions).max() < 1e-12
+    assert np.abs(positions(loop) - run.final_state.positions).max() < 1e-12
     loop.reset()
-    loop.advance(1, horizontal[:, ::-1])  # upwards: p = h^2 F / m after one step, beside the rest
-    free, moved = body.free, loop.positions
+    loop.advance(
+        1, pushes(loop, horizontal[:, ::-1])
+    )  # upwards: p = h^2 F / m after one step, beside the rest
+    free, moved = body.free, positions(loop)
     loop.reset()
     loop.advance(1)
     lift = 1e-6 * horizontal[free, 0] / body.masses[free]
-    assert (moved - loop.positions)[free, 1] == pytest.approx(lift, abs=1e-12)
+    assert (moved - positions(loop))[free, 1] == pytest.approx(lift, abs=1e-12)
     loop.reset()
     loop.kick(2.0, np.random.default_rng(0))
     loop.advance(1)
-    assert 1e-3 < np.abs(loop.positions - body.positions).max() < 1e-2
+    assert 1e-3 < np.abs(positions(loop) - body.positions).max() < 1e-2
     assert loop.alive
+
+
+def test_any_model_is_its_rollout(tmp_path):
+    w_out = np.random.default_rng(0).normal(size=(5, 2)) / 50
+    reservoir = mcmj.Reservoir(CHAIN, **CHAIN_PARTS, w_out=w_out)
+    reservoir.set_state(qvel=[1.0, -2.0])
+    loop = LiveLoop(reservoir, {"taught": w_out})
+    loop.advance(500)
+    run = reservoir.rollout(500)
+    assert np.array_equal(loop.data.qpos, reservoir.qpos)
+    held = loop.outputs[0]
+    loop.freeze(0)
+    loop.advance(300)
+    offset = np.tile([held, 0.0], (300, 1))
+    reservoir.rollout(offset=offset, gate=(0.0, 1.0))
+    assert np.array_equal(loop.data.qpos, reservoir.qpos)
+    assert loop.outputs[0] == held
+    loop.reset()
+    loop.advance(1)
+    assert np.abs(loop.data.sensordata[loop._engine.channels.signals] - run.signals[0]).max() == 0
+    with pytest.raises(InvalidArgumentError, match="engine: expected 'mujoco'"):
+        LiveLoop(mcmj.Simulation(mcmj.random_body(0), engine="twin"), {"w": w_out})
 
 
 def test_every_free_node_can_be_picked_by_the_mouse(body):
@@ -85,7 +127,7 @@ def test_every_free_node_can_be_picked_by_the_mouse(body):
 
 def test_what_does_not_fit_is_said(loop, body, monkeypatch):
     with pytest.raises(InvalidArgumentError, match="readouts: expected at least one"):
-        LiveLoop(body, {})
+        LiveLoop(mcmj.Simulation(body), {})
     with pytest.raises(UnknownNameError, match="valid choices: biased, plain"):
         loop.switch("trot")
     with pytest.raises(InvalidArgumentError, match="channel: expected 0 to 1"):

@@ -333,6 +333,18 @@ def test_forces_act_on_joints_and_on_bodies():
         reservoir.rollout(5, forces={"no": (0, 0, 1)})
 
 
+def test_copies_may_be_pushed_differently():
+    pushes = np.array([[1.0, 2.0, -3.0], [0.0, -1.0, 0.5]])
+    both = Reservoir(ARM, sensors="q1", channels=["m1"], copies=2)
+    run = both.rollout(500, forces={"b": pushes}, record=("qpos",))
+    for copy, push in enumerate(pushes):
+        alone = Reservoir(ARM, sensors="q1", channels=["m1"])
+        wanted = alone.rollout(500, forces={"b": push}, record=("qpos",))
+        assert np.array_equal(run.qpos[copy], wanted.qpos)
+    with pytest.raises(InvalidArgumentError, match=r"forces on b: expected shape \(2, 3\)"):
+        both.rollout(5, forces={"b": np.zeros((3, 3))})
+
+
 def test_a_heavier_body_and_a_cut_tendon_are_another_model():
     soft = ARM.replace('<spatial name="t">', '<spatial name="t" stiffness="30" damping="1">')
     reservoir = Reservoir(soft, sensors="q1", channels=["m1"])

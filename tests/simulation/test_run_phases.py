@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import twins
+from models import CHAIN, CHAIN_PARTS
 
 import mcmj
 from mcmj import Reservoir, Simulation
@@ -229,20 +230,11 @@ def test_ensembles_are_refused(body, w_out):
         run_schedule(mcmj.Ensemble(body, copies=2, w_out=w_out), Schedule([Phase(0.05)]), 0)
 
 
-CHAIN = """
-<mujoco><option timestep="0.002" gravity="0 0 0" integrator="implicitfast"/><worldbody>
-<body name="a"><joint name="j1" axis="0 0 1" damping=".05" stiffness="2"/>
-  <geom type="capsule" fromto="0 0 0 .2 0 0" size=".02"/>
-<body name="b" pos=".2 0 0"><joint name="j2" axis="0 0 1" damping=".02" stiffness="1"/>
-  <geom type="capsule" fromto="0 0 0 .2 0 0" size=".02"/></body></body></worldbody>
-<actuator><motor name="m1" joint="j1"/><motor name="m2" joint="j2"/></actuator></mujoco>"""
-
-
 def test_phases_of_any_model():
     """Freeze, switch, forces by joint and by body, noise, masses: rollouts with that law."""
     rng = np.random.default_rng(3)
     w_out, other = 0.2 * rng.normal(size=(2, 5, 2))
-    model = Reservoir(CHAIN, sensors=["jointpos:*", "jointvel:*"], channels=["m1", "m2"])
+    model = Reservoir(CHAIN, **CHAIN_PARTS)
     model.set_state(qvel=[1.0, -2.0])
     model.set_readout(w_out)
     start = model.snapshot()
@@ -255,7 +247,7 @@ def test_phases_of_any_model():
     run = run_schedule(model, Schedule(phases), seed=0, record=("signals", "outputs"))
     assert np.allclose(run.feedback[:200, 1], run.feedback[0, 1], rtol=0, atol=0)
 
-    model = Reservoir(CHAIN, sensors=["jointpos:*", "jointvel:*"], channels=["m1", "m2"])
+    model = Reservoir(CHAIN, **CHAIN_PARTS)
     model.restore(start)
     model.set_readout(w_out)
     held = (model.signals @ w_out[:4] + w_out[4])[1]

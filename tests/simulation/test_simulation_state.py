@@ -82,6 +82,14 @@ def test_set_state(body):
     assert_same(simulation.rollout(100, record=ALL), twin)
 
 
+def test_a_thinned_trajectory_is_every_nth_sample(body, w_bias, drive):
+    whole = Simulation(body, w_out=w_bias).rollout(**drive, record=ALL)
+    thin = whole.thinned(7)
+    for name in (*ALL, "times"):
+        assert np.array_equal(getattr(thin, name), getattr(whole, name)[::7])
+    assert thin.qpos is None
+
+
 @pytest.mark.parametrize("chunk", [1, 7, 100, T, 10 * T])
 @pytest.mark.parametrize("options", [{}, {"substeps": 3, "feedback_delay": 1}])
 def test_chunks_equal_one_rollout(body, w_bias, drive, chunk, options):

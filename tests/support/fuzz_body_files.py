@@ -10,6 +10,7 @@ import subprocess
 import sys
 import time
 from contextlib import suppress
+from dataclasses import replace
 
 import numpy as np
 
@@ -65,7 +66,9 @@ def batch(seed: int) -> None:
         faulthandler.dump_traceback_later(HANG, exit=True)
         rng = np.random.default_rng(i)
         law = LAWS[i % len(LAWS)]
-        body = mcmj.random_body(i, 5)
+        body = mcmj.random_body(i, 5, depth=50.0 * (i // len(LAWS) % 2))
+        if i % 3 == 0:
+            body = replace(body, direction=rng.normal(size=body.dimensions))
         how = {"integrator": "leapfrog"} if law == "leapfrog" else {"springs": law}
         if law == "coupled":
             how = {"springs": coupled}

@@ -8,11 +8,11 @@ import mcmj
 from mcmj.utils.errors import StabilityWarning
 
 
-def network(seed=0, nodes=10, *, d1=(1.0, 2.0), cubic=0.0, n_outputs=0):
+def network(seed=0, nodes=10, *, d1=(1.0, 2.0), cubic=0.0, n_outputs=0, depth=0.0):
     cubic = (cubic, 2 * cubic)
     return mcmj.random_body(
-        seed, nodes, width=1.0, height=1.0, k1=(50.0, 100.0), k3=cubic, d1=d1, d3=cubic,
-        masses=(0.5, 2.0), n_outputs=n_outputs,
+        seed, nodes, width=1.0, height=1.0, depth=depth, k1=(50.0, 100.0), k3=cubic, d1=d1,
+        d3=cubic, masses=(0.5, 2.0), n_outputs=n_outputs,
     )  # fmt: skip
 
 

@@ -10,8 +10,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from mcmj.analysis.loops.closed_loops import LoopRun, advanced
-from mcmj.core.body import Body, spring_lengths
+from mcmj.analysis.loops.loop_map import LoopRun, advanced
+from mcmj.core.body import Body, require_plane, spring_lengths
 from mcmj.core.readout import Readout, checked_readout
 from mcmj.core.rollout_arguments import check_drive
 from mcmj.core.trajectory import State
@@ -27,7 +27,7 @@ class ClosedLoop:
     """A trained body under its own readout.
 
     Attributes:
-        body: the body.
+        body: the body, planar and pushed along x.
         w_out: readout (L, n_outputs), or with a bias in the last row; None: open loop.
         timestep: control and physics step [s].
         threads: results do not depend on them.
@@ -42,6 +42,7 @@ class ClosedLoop:
     threads: int = 1
 
     def __post_init__(self) -> None:
+        require_plane(self.body, "the analysis of a closed loop")
         require_number("timestep", self.timestep, 0.0, open_low=True)
         require_count("threads", self.threads, 1)
         if self.w_out is not None:

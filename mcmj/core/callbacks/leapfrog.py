@@ -24,16 +24,13 @@ models with the numeric TAG, that userdata and integrator Euler are touched: poi
 slide joints and tendons. Forces in xfrc_applied are not averaged, and act h/2 early.
 """
 
-import ctypes
-from pathlib import Path
 from typing import Any
 
-import mujoco
 from llvmlite import binding
 from numba import njit, types
 
+from mcmj.core.callbacks.library import function_address
 from mcmj.core.callbacks.pointers import TAG, WORDS, address_of, doubles, integers
-from mcmj.utils.errors import McmjError
 from mcmj.utils.validation import Array
 
 _HEAD = 2  # of userdata, before its five rows
@@ -66,13 +63,7 @@ def link_actuation() -> None:
     Raises:
         McmjError: MuJoCo's library is not where its wheels have it.
     """
-    folder = Path(mujoco.__file__).parent
-    for pattern in ("libmujoco*.so*", "libmujoco*.dylib", "mujoco.dll"):
-        for library in sorted(folder.glob(pattern)):
-            function = ctypes.CDLL(str(library)).mj_fwdActuation
-            binding.add_symbol("mj_fwdActuation", ctypes.cast(function, ctypes.c_void_p).value)
-            return
-    raise McmjError(f"no MuJoCo library in {folder}")
+    binding.add_symbol("mj_fwdActuation", function_address("mj_fwdActuation"))
 
 
 @njit(**COMPILE)

@@ -67,6 +67,19 @@ def call_coupled(typingctx, law, x1, x2, user, count, width, pull):
     return types.none(*[types.int64] * 7), codegen
 
 
+@intrinsic
+def call_step(typingctx, function, model, data):
+    """Call MuJoCo's mj_step, or another void function of a model and its data; all addresses."""
+
+    def codegen(context, builder, signature, args):
+        word = ir.IntType(64)
+        step = ir.FunctionType(ir.VoidType(), [word, word])
+        builder.call(builder.inttoptr(args[0], step.as_pointer()), args[1:])
+        return context.get_dummy_value()
+
+    return types.none(types.int64, types.int64, types.int64), codegen
+
+
 def _int_to_pointer(element: ir.Type) -> Callable:
     def codegen(context, builder, signature, args):
         return builder.inttoptr(args[0], element.as_pointer())

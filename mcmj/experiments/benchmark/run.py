@@ -9,6 +9,7 @@ import mujoco
 import numpy as np
 
 from mcmj.core.body import Body
+from mcmj.core.callbacks.online_learning import Learner
 from mcmj.core.integrators import DEFAULT_INTEGRATOR, INTEGRATORS
 from mcmj.core.random_body import random_body
 from mcmj.core.rollout_arguments import check_drive
@@ -16,12 +17,14 @@ from mcmj.experiments.benchmark.config import Config, small_readout
 from mcmj.experiments.benchmark.full_scene import full_scene
 from mcmj.experiments.benchmark.process import machine, memory, start_up
 from mcmj.reference.twin.population import Population
+from mcmj.simulation.corrected_run import Stretch, run_corrected
 from mcmj.simulation.ensemble import Ensemble
 from mcmj.simulation.simulation import Simulation
 from mcmj.utils.progress import OnSteps
 from mcmj.utils.timing import Work, interleaved_seconds, median_ratio
 
 BATCH = 64  # bodies in one call of the twin
+CORRECT_EVERY = 5  # steps of 1 ms
 
 
 @dataclass(frozen=True)
@@ -176,7 +179,36 @@ def growth(config: Config, body: Body) -> dict[str, object]:
     return {"growth": rows}
 
 
-PARTS = (loop_costs, twin_costs, thread_speedups, scene_costs, start_up, growth, memory)
+def learning_costs(config: Config, body: Body) -> dict[str, object]:
+    """A step in which a readout is corrected every 5 ms, over one in closed loop."""
+    n, steps = body.n_springs, max(CORRECT_EVERY, config.steps)
+    simulation = Simulation(body, w_out=np.zeros((n + 1, body.n_outputs)))
+    targets = np.zeros((-(-steps // CORRECT_EVERY), body.n_outputs))
+    stretch = Stretch(targets, np.zeros((steps, body.n_outputs)))
+
+    def learn() -> None:
+        weights = np.zeros((body.n_outputs, n + 1))
+        learner = Learner(np.eye(n + 1), weights, body.rest_lengths, np.ones(n))
+        run_corrected(simulation, learner, [stretch], every=CORRECT_EVERY)
+
+    works: dict[str, Work] = {
+        "learn": learn,
+        "closed": lambda: simulation.rollout(offset=stretch.offset),
+    }
+    seconds = interleaved_seconds(works, config.repeats)
+    return {"force_learning_ratio": median_ratio(seconds, "learn", "closed")}
+
+
+PARTS = (
+    loop_costs,
+    learning_costs,
+    twin_costs,
+    thread_speedups,
+    scene_costs,
+    start_up,
+    growth,
+    memory,
+)
 
 
 def _population(bodies: list[Body], **options: Any) -> Population:

@@ -45,7 +45,7 @@ def run(config: Config, *, on_steps: OnSteps = lambda steps: None) -> Result:
         actions="inputs", input_limit=config.input_limit, kick=0.0,
         control_timestep=config.control_timestep, time_limit=config.time_limit,
     )  # fmt: skip
-    environment = make(body, fit.w_out, wanted, setting)
+    environment = make(Simulation(body, w_out=fit.w_out), wanted, setting)
 
     def play(knots: Array) -> Episode:
         episode = _play(environment, _signal(config, knots))
@@ -91,7 +91,7 @@ def _signal(config: Config, knots: Array) -> Array:
 def _play(environment: "Environment", signal: Array) -> Episode:
     """One episode; the rewards of what is left of it after a run-away are 0."""
     environment.reset()
-    n_outputs = environment.physics.body.n_outputs
+    n_outputs = environment.physics.reservoir.n_outputs
     outputs, rewards = np.zeros((len(signal), n_outputs)), np.zeros(len(signal))
     for k, value in enumerate(signal):
         step = environment.step(np.array([value]))

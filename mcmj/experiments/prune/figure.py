@@ -60,6 +60,6 @@ def _draw_sensors(axes: Axes, result: Result) -> None:
     method, first = result.config.methods[0], result.bodies[0]
     sensed = first.orders[method][: result.needed(method, 0) or 0]
     plot_body(axes, first.body)
-    lines = first.body.positions[first.body.springs[sensed]]
+    lines = first.body.positions[first.body.springs[sensed], :2]
     axes.add_collection(LineCollection(list(lines), colors="black", linewidths=2.2, zorder=1))
     axes.set_title(f"{len(lines)} of {first.body.n_springs} springs (black) suffice")

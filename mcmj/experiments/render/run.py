@@ -86,7 +86,7 @@ def _film_of_run(
     """Before, during and after the disturbance; or one undisturbed stretch."""
     body, draw = simulation.body, stream(config.seed, "forces")
     pushes = draw.uniform(-config.forces, config.forces, body.n_nodes)
-    kick = config.kick * draw.standard_normal((body.n_nodes, 2))
+    kick = config.kick * draw.standard_normal(body.positions.shape)
 
     def advance(phases: list[Phase]) -> ScheduleRun:
         record = ("outputs", "positions")

@@ -67,7 +67,7 @@ def _run_body(config: Config, body: Body) -> tuple[dict[str, dict[float, Cell]],
 
 def _kicked(body: Body, config: Config) -> State:
     rng = stream(config.seed, "initial_state")
-    speeds = rng.uniform(-config.speed, config.speed, (body.n_nodes, 2))
+    speeds = rng.uniform(-config.speed, config.speed, body.positions.shape)
     return State(body.positions, np.where(body.fixed[:, None], 0.0, speeds))
 
 

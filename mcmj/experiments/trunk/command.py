@@ -10,7 +10,7 @@ from mcmj.experiments.trunk.config import Config, total_seconds
 from mcmj.experiments.trunk.figure import figures
 from mcmj.experiments.trunk.result import Result
 from mcmj.experiments.trunk.run import run
-from mcmj.robots.trunk_walker import TIMESTEP
+from mcmj.robots.trunk_walker import TIMESTEP, walk
 from mcmj.utils import files
 
 SHOWN = 5.0  # seconds of each gait in the film
@@ -30,12 +30,10 @@ def film(result: Result, out: Path) -> None:
     """The gaits one after another."""
     from mcmj.pictures.trunk_video import trunk_video  # needs OpenGL, the rest does not
 
-    walkers = {
-        name: gait.walker() for name, gait in result.gaits.items() if gait.learned is not None
-    }
-    walks = {name: walker.walk(SHOWN, joints=True) for name, walker in walkers.items()}
-    first = next(iter(walkers.values()))
-    trunk_video(out / "trunk.mp4", first.model, first.trunk, walks)
+    gaits = {name: gait for name, gait in result.gaits.items() if gait.learned is not None}
+    walks = {name: walk(gait.robot(), gait.trunk, SHOWN) for name, gait in gaits.items()}
+    first = next(iter(gaits.values()))
+    trunk_video(out / "trunk.mp4", first.robot().model, first.trunk, walks)
 
 
 def show(result: Result, console: Console) -> None:

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, field
 
-from mcmj.robots.force_learning import ForceLearning
+from mcmj.learning.force_learning import ForceLearning
 from mcmj.robots.trunk import TrunkSettings
 from mcmj.robots.trunk_walker import PUSH_DURATION
 from mcmj.targets.gaits import GAITS
@@ -80,7 +80,6 @@ class Config:
 def total_seconds(config: Config) -> float:
     """Time simulated at most, for a progress bar [s]."""
     learning, gaits = config.learning, len(config.gaits)
-    learn = learning.warm_up + learning.rounds * (learning.round_duration + learning.trial)
     parts = {
         "regression": learning.washout + config.teaching + config.walking,
         "rest": config.walking,
@@ -89,4 +88,4 @@ def total_seconds(config: Config) -> float:
         "steps": len(config.steps_ms) * config.walking,
     }
     besides = sum(parts[part] for part in config.parts)
-    return gaits * (config.seeds * (learn + config.walking) + besides)
+    return gaits * (config.seeds * (learning.total + config.walking) + besides)

@@ -1,15 +1,18 @@
 """What else is tried with the first robot, each part with one gait."""
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
 from mcmj.experiments.blow_ups import or_lost
 from mcmj.experiments.trunk.config import Config
 from mcmj.experiments.trunk.result import LearnedGait, Table, fell, forward_speed
+from mcmj.learning.force_learning import force_learn
+from mcmj.learning.trial import trial_error
 from mcmj.metrics import orbits as metrics
-from mcmj.robots.force_learning import learn_by_regression, trial_error
-from mcmj.robots.trunk_walker import TIMESTEP, TrunkWalker
+from mcmj.robots.trunk_walker import TIMESTEP, has_fallen, new_robot, stand, walk
+from mcmj.simulation.reservoir import Reservoir
 from mcmj.utils.errors import DivergenceError
 from mcmj.utils.progress import OnSteps
 from mcmj.utils.validation import Array
@@ -19,27 +22,26 @@ def by_regression(
     config: Config, gaits: dict[str, LearnedGait], name: str, on_steps: OnSteps
 ) -> Table:
     """Orbit error of a free run after plain regression, infinite if the robot falls."""
-    gait = gaits[name]
-    walker = TrunkWalker(gait.trunk)
+    gait, washout = gaits[name], config.learning.washout
+    robot, trunk = new_robot(gait.trunk), gait.trunk
+    learning = replace(config.learning, warm_up=washout + config.teaching, rounds=0)
     try:
-        fit = learn_by_regression(
-            walker, gait.target, config.learning, duration=config.teaching, seed=config.seed
-        )
-        error = trial_error(walker, gait.target, config.walking)
+        force_learn(
+            robot, gait.target, learning, seed=config.seed, stand=lambda: stand(robot),
+            on_steps=on_steps,
+        )  # fmt: skip
     except DivergenceError:
-        return {"train_nrmse": None, "orbit_error": np.inf}
-    on_steps(round((config.learning.washout + config.teaching + config.walking) / walker.timestep))
-    return {"train_nrmse": fit.train_nrmse, "orbit_error": error}
+        return {"orbit_error": np.inf}
+    error = trial_error(robot, gait.target, config.walking, has_fallen(trunk), on_steps=on_steps)
+    return {"orbit_error": error}
 
 
 def from_rest(config: Config, gaits: dict[str, LearnedGait], name: str, on_steps: OnSteps) -> Table:
     """The loop is closed while the robot stands: does it start by itself?"""
-    gait = gaits[name]
-    walker = gait.walker()
-    walker.stand()
-    walker.close(True)
-    table = _end_of(config, gait, walker, config.walking)
-    on_steps(round(config.walking / walker.timestep))
+    robot = gaits[name].robot()
+    stand(robot)
+    table = _end_of(config, gaits[name], robot, config.walking)
+    on_steps(round(config.walking / robot.timestep))
     return table
 
 
@@ -48,20 +50,20 @@ def push(
 ) -> dict[float, int]:
     """How many pushes of each size, both ways at every moment, do not end in a fall."""
     gait = gaits[name]
-    walker = gait.walker()
+    robot = gait.robot()
     moments: list[Array] = []
     for _ in range(config.pushes):
-        moments.append(walker.state)
-        walker.advance(round(gait.target.period / config.pushes / walker.timestep))
+        moments.append(robot.snapshot())
+        robot.rollout(round(gait.target.period / config.pushes / robot.timestep), record=())
     survived = {}
     for impulse in sorted(config.impulses):
         ends = []
         for moment in moments:
             for way in (impulse, -impulse):
-                walker.restore(moment)
-                ends.append(_end_of(config, gait, walker, config.survive, push=way))
+                robot.restore(moment)
+                ends.append(_end_of(config, gait, robot, config.survive, push=way))
         survived[impulse] = sum(end["falls"] == 0 for end in ends)
-        on_steps(round(len(ends) * config.survive / walker.timestep))
+        on_steps(round(len(ends) * config.survive / robot.timestep))
     return survived
 
 
@@ -70,12 +72,12 @@ def switch(config: Config, gaits: dict[str, LearnedGait], name: str, on_steps: O
     table: Table = {}
     for other in gaits:
         if other != name:
-            walker = gaits[name].walker()
+            robot = gaits[name].robot()
             learned = gaits[other].learned
             assert learned is not None
-            walker.set_readout(learned.w_out)
-            table[other] = _end_of(config, gaits[other], walker, config.survive)
-            on_steps(round(config.survive / walker.timestep))
+            robot.set_readout(learned.w_out)
+            table[other] = _end_of(config, gaits[other], robot, config.survive)
+            on_steps(round(config.survive / robot.timestep))
     return table
 
 
@@ -85,8 +87,8 @@ def step_study(
     """Speed and orbit error of the same readout at other time steps [ms]."""
     table: Table = {}
     for step in config.steps_ms:
-        walker = gaits[name].walker(timestep=1e-3 * step)
-        table[f"{step:g}"] = _end_of(config, gaits[name], walker, config.walking)
+        robot = gaits[name].robot(1e-3 * step)
+        table[f"{step:g}"] = _end_of(config, gaits[name], robot, config.walking)
         on_steps(round(config.walking / TIMESTEP))
     return table
 
@@ -101,13 +103,13 @@ def push_summary(config: Config, survived: dict[str, dict[float, int]]) -> Table
 
 
 def _end_of(
-    config: Config, gait: LearnedGait, walker: TrunkWalker, duration: float, *, push: float = 0.0
+    config: Config, gait: LearnedGait, robot: Reservoir, duration: float, *, push: float = 0.0
 ) -> Table:
     """How a walk from now on ends: its last part, half of it at most."""
-    walk = or_lost(lambda: walker.walk(duration, push=push), None)
-    if walk is None or fell(gait, walk):
+    walked = or_lost(lambda: walk(robot, gait.trunk, duration, push=push), None)
+    if walked is None or fell(gait, walked):
         return {"falls": 1, "speed_m_s": None, "orbit_error": None}
-    last = walk.after(duration - min(config.judged, duration / 2))
+    last = walked.after(duration - min(config.judged, duration / 2))
     error = metrics.orbit_error(last.outputs[0], gait.target)
     return {"falls": 0, "speed_m_s": forward_speed(last), "orbit_error": error}
 

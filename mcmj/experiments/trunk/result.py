@@ -1,20 +1,20 @@
 """How the robots walk: a gait of one robot, tables over gaits and seeds."""
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from mcmj.experiments.trunk.config import Config
+from mcmj.learning.force_learning import Learned
 from mcmj.metrics import gaits as gaitmetrics
 from mcmj.metrics import orbits as metrics
 from mcmj.metrics.success_rates import success_rate
 from mcmj.robots import walk_metrics
-from mcmj.robots.force_learning import Learned
 from mcmj.robots.quadruped import GRAVITY
 from mcmj.robots.trunk import Trunk
-from mcmj.robots.trunk_walker import TrunkWalker
+from mcmj.robots.trunk_walker import TIMESTEP, new_robot
 from mcmj.robots.walk_metrics import Walk
+from mcmj.simulation.reservoir import Reservoir
 from mcmj.targets.limit_cycles import Target
 
 Table = dict[str, object]
@@ -36,14 +36,18 @@ class LearnedGait:
     learned: Learned | None
     walk: Walk | None
 
-    def walker(self, **options: Any) -> TrunkWalker:
-        """The robot in this gait, in closed loop."""
+    def robot(self, timestep: float = TIMESTEP) -> Reservoir:
+        """The robot in this gait, at any time step [s]."""
         assert self.learned is not None
-        walker = TrunkWalker(self.trunk, **options)
-        walker.set_readout(self.learned.w_out)
-        walker.close(True)
-        walker.restore(self.learned.state)
-        return walker
+        robot = new_robot(self.trunk)
+        robot.set_readout(self.learned.w_out)
+        robot.restore(self.learned.state)
+        if timestep == robot.timestep:
+            return robot
+        other = new_robot(self.trunk, timestep=timestep)
+        other.set_readout(self.learned.w_out)
+        other.set_state(robot.qpos, robot.qvel)
+        return other
 
 
 @dataclass(frozen=True)

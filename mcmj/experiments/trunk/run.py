@@ -8,9 +8,9 @@ from functools import partial
 from mcmj.experiments.trunk.config import Config
 from mcmj.experiments.trunk.parts import RUNS, push_summary
 from mcmj.experiments.trunk.result import LearnedGait, Result, Table, seeds_table, walk_table
-from mcmj.robots.force_learning import force_learn
+from mcmj.learning.force_learning import force_learn
 from mcmj.robots.trunk import draw_trunk, muscle_target
-from mcmj.robots.trunk_walker import TrunkWalker
+from mcmj.robots.trunk_walker import has_fallen, new_robot, stand, walk
 from mcmj.utils.errors import DivergenceError
 from mcmj.utils.progress import OnSteps
 from mcmj.utils.threads import in_threads
@@ -42,16 +42,19 @@ def run(config: Config, *, on_steps: OnSteps = lambda steps: None) -> Result:
     return Result(config, gaits, table)
 
 
-def learn(config: Config, robot: tuple[int, str], on_steps: OnSteps) -> LearnedGait:
+def learn(config: Config, chosen: tuple[int, str], on_steps: OnSteps) -> LearnedGait:
     """One robot, by its seed, learns one gait, by its name, and walks."""
-    seed, name = robot
+    seed, name = chosen
     trunk = draw_trunk(seed, config.trunk)
     target = muscle_target(trunk, name, config.pace)
-    walker = TrunkWalker(trunk)
+    robot = new_robot(trunk)
     try:
-        learned = force_learn(walker, target, config.learning, seed=seed, on_steps=on_steps)
-        walk = walker.walk(config.walking)
+        learned = force_learn(
+            robot, target, config.learning, seed=seed, stand=lambda: stand(robot),
+            failed=has_fallen(trunk), on_steps=on_steps,
+        )  # fmt: skip
+        walked = walk(robot, trunk, config.walking)
     except DivergenceError:
         return LearnedGait(trunk, target, None, None)
-    on_steps(round(config.walking / walker.timestep))
-    return LearnedGait(trunk, target, learned, walk)
+    on_steps(round(config.walking / robot.timestep))
+    return LearnedGait(trunk, target, learned, walked)

@@ -6,14 +6,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from mcmj.core.body import Body
-from mcmj.core.trajectory import State
 from mcmj.learning.lessons import Teaching
 from mcmj.learning.teaching import synchronise, teach
 from mcmj.metrics import orbits
 from mcmj.mjcf.bundled import open_body
 from mcmj.pictures.film import deformation_scale
-from mcmj.pictures.viewer import FPS, Viewer
+from mcmj.pictures.window.body_viewer import BodyViewer
+from mcmj.pictures.window.viewer import FPS, Viewer
 from mcmj.simulation.interactive import LiveLoop
+from mcmj.simulation.models.reservoir_file import is_reservoir_file
+from mcmj.simulation.reservoir import Reservoir
 from mcmj.simulation.simulation import Simulation
 from mcmj.targets.limit_cycles import TARGETS, target
 from mcmj.utils.errors import InvalidArgumentError
@@ -31,7 +33,8 @@ class Config:
 
     Attributes:
         body: a body file, or the name of a body that comes with mcmj. Without a readout in the
-            file it is taught the paper's three targets first.
+            file it is taught the paper's three targets first. Or the file of a trained reservoir
+            (Reservoir.to_mjcf) of any model.
         kick_speed: standard deviation of the nodes' speeds after a kick [m/s].
         deformation: displacements are drawn this many times larger; default: a round factor
             that makes them visible.
@@ -108,16 +111,11 @@ def run(config: Config) -> Result:
         NoDisplayError: there is no screen.
         BodyFileError, UnknownNameError: no such body.
     """
-    body, readouts = _body_and_readouts(config)
-    first = next(iter(readouts))
-    start, scale = _start(body, first, readouts[first])
-    loop = LiveLoop(body, readouts, start=start)
-    kicks = stream(config.seed, "initial_state")
+    window, loop = _window(config)
     presses, begin = config.presses, loop.time
     times, outputs = [], []
-    with Viewer(
-        loop, config.deformation or scale, lambda: loop.kick(config.kick_speed, kicks)
-    ) as viewer:
+    first = loop.readout
+    with window as viewer:
         opened = now = time.perf_counter()
         while viewer.is_open and (config.seconds is None or loop.time - begin < config.seconds):
             time.sleep(max(0.0, now + 1 / FPS - time.perf_counter()))
@@ -127,9 +125,29 @@ def run(config: Config) -> Result:
             outputs.append(viewer.run_frame(min(now - before, LONGEST_FRAME)))
             times.append(loop.time - begin)
         wall = time.perf_counter() - opened
-    seen = np.array(outputs).reshape(-1, body.n_outputs)
+    seen = np.array(outputs).reshape(-1, loop.reservoir.n_outputs)
     away = orbits.orbit_distances(seen, target(first)) if first in TARGETS and len(seen) else None
     return Result(np.array(times), seen, away, wall, config)
+
+
+def _window(config: Config) -> tuple[Viewer, LiveLoop]:
+    """The window, still closed, and what it shows: a body, or a model from a reservoir's file."""
+    kicks = stream(config.seed, "initial_state")
+    if is_reservoir_file(config.body):
+        reservoir = Reservoir.open(config.body)
+        if reservoir.w_out is None:
+            raise InvalidArgumentError("body", "a file with a readout", config.body)
+        loop = LiveLoop(reservoir, {"readout": reservoir.w_out})
+        return Viewer(loop, lambda: loop.kick(config.kick_speed, kicks)), loop
+    body, readouts = _body_and_readouts(config)
+    first = next(iter(readouts))
+    simulation, scale = _start(body, first, readouts[first])
+    body_loop = LiveLoop(simulation, readouts)
+    scale = config.deformation or scale
+    window = BodyViewer(
+        body_loop, lambda: body_loop.kick(config.kick_speed, kicks), body=body, scale=scale
+    )
+    return window, body_loop
 
 
 def _body_and_readouts(config: Config) -> tuple[Body, dict[str, Array]]:
@@ -146,14 +164,14 @@ def _body_and_readouts(config: Config) -> tuple[Body, dict[str, Array]]:
     return body, readouts
 
 
-def _start(body: Body, name: str, w_out: Array) -> tuple[State | None, float]:
-    """On the target if the readout is named after one, else rest; and a scale for the window."""
+def _start(body: Body, name: str, w_out: Array) -> tuple[Simulation, float]:
+    """On the target if the readout is named after one, else at rest; and a scale for the window."""
     simulation = Simulation(body)
-    start = None
     if name in TARGETS:
         synchronise(simulation, target(name), Teaching().washout)
-        start = simulation.state
+    start = simulation.snapshot()
     simulation.set_readout(w_out)
     steps = round(TRIAL / simulation.timestep)
     trial = simulation.rollout(steps, record=("positions",))
-    return start, deformation_scale(body, trial.get("positions"))
+    simulation.restore(start)
+    return simulation, deformation_scale(body, trial.get("positions"))

@@ -6,12 +6,11 @@ Every ground is walked on from several moments of the stride, by the body that d
 
 import numpy as np
 
-from mcmj.experiments.walk.lesson import Table, WalkLesson, states_at
+from mcmj.experiments.walk.lesson import Table, WalkLesson, walker_at
 from mcmj.robots import walk_metrics
 from mcmj.robots.quadruped import GRAVITY
 from mcmj.robots.walk_metrics import Walk
 from mcmj.robots.walk_scene import Terrain
-from mcmj.robots.walker import Walker
 from mcmj.targets.gaits import LEGS
 from mcmj.utils.progress import OnSteps
 from mcmj.utils.validation import Array
@@ -28,16 +27,14 @@ def adapt(lesson: WalkLesson, name: str, on_steps: OnSteps = lambda steps: None)
 def _response(lesson: WalkLesson, name: str, coupling: float, on_steps: OnSteps) -> Table:
     config, gait = lesson.config, lesson.gait(name, coupling)
     waits = lesson.period(name) * np.arange(config.starts) / config.starts
-    states = states_at(lesson, gait, waits, coupling)
+    motions = np.array([each.motion for each in walker_at(lesson, gait, waits, coupling)])
 
     def on(terrain: Terrain) -> Table:
         walker = lesson.walker(terrain=terrain, coupling=coupling, copies=config.starts)
-        walker.start(gait)
-        walker.restore(states)
-        walker.stand()
+        walker.start(gait, motions)
         walk = walker.walk(config.before + config.after)
-        on_steps(config.starts * round(walk.times[-1] / walker.timestep))
-        return _row(lesson, name, walker, walk, terrain.slope)
+        on_steps(config.starts * round((config.before + config.after) / walker.timestep))
+        return _row(lesson, name, terrain, walk)
 
     level = on(Terrain())
     slopes = {f"{slope:g}": on(Terrain(slope=np.radians(slope))) for slope in config.slopes}
@@ -45,12 +42,12 @@ def _response(lesson: WalkLesson, name: str, coupling: float, on_steps: OnSteps)
     return {"slope": _sorted(slopes | {"0": level}), "load": _sorted(loads | {"0": level})}
 
 
-def _row(lesson: WalkLesson, name: str, walker: Walker, walk: Walk, slope: float) -> Table:
+def _row(lesson: WalkLesson, name: str, terrain: Terrain, walk: Walk) -> Table:
     """Falls, and the spread over the copies that did not.
 
     ground_lag is that of the feet's load behind the outputs, mean of all legs [strides].
     """
-    falls = np.isfinite(walk_metrics.fall_times(walk, lesson.config.robot.leg, slope))
+    falls = np.isfinite(walk_metrics.fall_times(walk, lesson.config.robot.leg, terrain.slope))
     upright = np.flatnonzero(~falls).tolist()
     settled = walk.after(lesson.config.before)
     guess = lesson.period(name)
@@ -60,7 +57,8 @@ def _row(lesson: WalkLesson, name: str, walker: Walker, walk: Walk, slope: float
         for copy, period in zip(upright, periods, strict=True)
         if np.isfinite(period)
     ]
-    costs = walk_metrics.costs_of_transport(settled, GRAVITY * walker.mass)
+    weight = GRAVITY * (lesson.config.robot.mass + terrain.load)
+    costs = walk_metrics.costs_of_transport(settled, weight)
     return {
         "falls": int(falls.sum()),
         "of": len(falls),

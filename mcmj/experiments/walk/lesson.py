@@ -1,8 +1,8 @@
 """What all parts of the walking experiment share: the taught body, robots, the table of a walk."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -21,6 +21,8 @@ from mcmj.utils.threads import in_threads
 from mcmj.utils.validation import Array
 
 Table = dict[str, object]
+K = TypeVar("K")
+V = TypeVar("V")
 
 
 @dataclass(frozen=True)
@@ -29,15 +31,15 @@ class WalkLesson:
 
     Attributes:
         gaits: taught without ground.
+        fits: errors of all readouts on what they were fitted to, for metrics.json.
         grounded: taught with the legs' loads in the body, if a part needs them.
-        fits: errors of both on what they were fitted to, for metrics.json.
     """
 
     config: Config
     body: Body
     gaits: dict[str, LegReadout]
+    fits: Table
     grounded: dict[str, LegReadout] = field(default_factory=dict)
-    fits: Table = field(default_factory=dict)
 
     def walker(self, **options: Any) -> Walker:
         """A new robot with the config's settings."""
@@ -64,31 +66,36 @@ def learn(config: Config) -> WalkLesson:
     body, readouts = get_body(config)
 
     def lift(name: str, on_steps: OnSteps) -> tuple[LegReadout, Fit]:
-        stride = STRIDES.get(name)
-        return teach_lift(body, readouts[name], gait_target(name), stride=stride, engine="twin")
-
-    gaits, lifts = _taught(config, lift)
-    lesson = WalkLesson(config, body, gaits, fits={"lift_nrmse": lifts})
-    if not {"adapt", "recover"} & set(config.parts):
-        return lesson
+        given: dict[str, Any] = {"stride": STRIDES.get(name), "pace": config.pace}
+        return teach_lift(body, readouts[name], gait_target(name), engine="twin", **given)
 
     def ground(name: str, on_steps: OnSteps) -> tuple[LegReadout, Fit]:
         walker = lesson.walker(coupling=config.coupling)
-        return teach_on_ground(walker, gaits[name], gait_target(name), config.seed)
+        return teach_on_ground(walker, lesson.gaits[name], gait_target(name), config.seed)
 
-    grounded, errors = _taught(config, ground)
-    return replace(lesson, grounded=grounded, fits=lesson.fits | {"ground_nrmse": errors})
+    taught = each(config.gaits, lift)
+    lesson = WalkLesson(config, body, *_told_apart(taught, "lift_nrmse"))
+    if not {"adapt", "recover"} & set(config.parts):
+        return lesson
+    grounded, errors = _told_apart(each(config.gaits, ground), "ground_nrmse")
+    return replace(lesson, grounded=grounded, fits=lesson.fits | errors)
 
 
-def _taught(
-    config: Config, teach: Callable[[str, OnSteps], tuple[LegReadout, Fit]]
-) -> tuple[dict[str, LegReadout], dict[str, float]]:
-    """Readouts and their errors by gait."""
-    results = dict(
-        zip(config.gaits, in_threads(teach, config.gaits, lambda steps: None), strict=True)
-    )
-    gaits = {name: gait for name, (gait, _) in results.items()}
-    return gaits, {name: fit.train_nrmse for name, (_, fit) in results.items()}
+def each(
+    items: Sequence[K],
+    work: Callable[[K, OnSteps], V],
+    on_steps: OnSteps = lambda steps: None,
+) -> dict[K, V]:
+    """Results of independent work by item."""
+    return dict(zip(items, in_threads(work, items, on_steps), strict=True))
+
+
+def _told_apart(
+    taught: dict[str, tuple[LegReadout, Fit]], error: str
+) -> tuple[dict[str, LegReadout], Table]:
+    """Readouts by gait, and their errors for metrics.json."""
+    errors = {name: fit.train_nrmse for name, (_, fit) in taught.items()}
+    return {name: gait for name, (gait, _) in taught.items()}, {error: errors}
 
 
 def walk_table(lesson: WalkLesson, name: str, walk: Walk) -> Table:
@@ -110,14 +117,20 @@ def walk_table(lesson: WalkLesson, name: str, walk: Walk) -> Table:
     return {"falls": int(fallen), **measured, "stride_period_s": period}
 
 
-def states_at(lesson: WalkLesson, gait: LegReadout, waits: Array, coupling: float = 0.0) -> Array:
-    """States (len(waits), n) of a robot after `before` seconds and ascending waits [s] more."""
+def walker_at(
+    lesson: WalkLesson, gait: LegReadout, waits: Array, coupling: float = 0.0
+) -> Iterator[Walker]:
+    """A robot after `before` seconds and ascending waits [s] more, one after the other."""
     walker = lesson.walker(coupling=coupling)
     walker.start(gait)
-    states, done = [], 0
     for wait in waits:
         until = round((lesson.config.before + wait) / walker.timestep)
-        walker.advance(until - done)
-        done = until
-        states.append(walker.snapshot()[0])
-    return np.array(states)
+        steps = until - round(walker.time / walker.timestep)
+        if steps > 0:
+            walker.rollout(steps, record=())
+        yield walker
+
+
+def states_at(lesson: WalkLesson, gait: LegReadout, waits: Array, coupling: float = 0.0) -> Array:
+    """Snapshots (len(waits), n) of `walker_at`."""
+    return np.vstack([walker.snapshot() for walker in walker_at(lesson, gait, waits, coupling)])

@@ -41,7 +41,7 @@ def _pushed(
     walker.start(gait)
     walker.restore(np.tile(states_at(lesson, gait, waits, coupling), (len(pushes), 1)))
     walk = walker.walk(config.after, push=np.repeat(pushes, n, axis=0))  # the unpushed ones first
-    on_steps(walker.copies * round(walk.times[-1] / walker.timestep))
+    on_steps(len(walk.trunk) * round(config.after / walker.timestep))
     upright = np.isinf(walk_metrics.fall_times(walk, config.robot.leg)).reshape(-1, n)
     table: Table = {"wander": max(_wander(walk.outputs[twin]) for twin in range(n))}
     for index, direction in enumerate(DIRECTIONS, start=1):

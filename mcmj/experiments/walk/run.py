@@ -3,16 +3,15 @@
 Independent walks run side by side on threads; nothing depends on how many.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import partial
-from typing import TypeVar
 
 import numpy as np
 
 from mcmj.experiments.walk.adapt import adapt
-from mcmj.experiments.walk.config import Config
-from mcmj.experiments.walk.lesson import Table, WalkLesson, learn, states_at, walk_table
+from mcmj.experiments.walk.config import Config, get_body
+from mcmj.experiments.walk.lesson import Table, WalkLesson, each, learn, states_at, walk_table
 from mcmj.experiments.walk.recover import recover
 from mcmj.robots import walk_metrics
 from mcmj.robots.walk_metrics import Walk
@@ -20,13 +19,10 @@ from mcmj.robots.walker import Walker
 from mcmj.simulation.simulation import Simulation
 from mcmj.utils.progress import OnSteps
 from mcmj.utils.seeds import stream
-from mcmj.utils.threads import in_threads
 from mcmj.utils.timing import interleaved_seconds, median_ratio
 
 COST_STEPS = 4000
 COST_REPEATS = 7
-K = TypeVar("K")
-V = TypeVar("V")
 
 
 @dataclass(frozen=True)
@@ -50,34 +46,32 @@ def run(config: Config, *, on_steps: OnSteps = lambda steps: None) -> Result:
     walks: dict[str, Walk] = {}
     table: Table = {**lesson.fits}
     if "walk" in config.parts:
-        walks = _each(config.gaits, partial(walk_gait, lesson), on_steps)
+        walks = each(config.gaits, partial(walk_gait, lesson), on_steps)
         table |= {name: walk_table(lesson, name, walk) for name, walk in walks.items()}
     if "switch" in config.parts:
-        falls = _each(config.pairs, partial(switch, lesson), on_steps)
+        falls = each(config.pairs, partial(switch, lesson), on_steps)
         table["switch"] = {
             f"{first}_to_{second}": {"falls": len(at), "of": config.moments, "falls_at": at}
             for (first, second), at in falls.items()
         }
     if "push" in config.parts:
-        table["push"] = push_table(config, _each(config.gaits, partial(push, lesson), on_steps))
+        table["push"] = push_table(config, each(config.gaits, partial(push, lesson), on_steps))
     if "adapt" in config.parts:
-        table["adapt"] = _each(config.gaits, partial(adapt, lesson), on_steps)
+        table["adapt"] = each(config.gaits, partial(adapt, lesson), on_steps)
     if "recover" in config.parts:
-        table["recover"] = _each(config.gaits, partial(recover, lesson), on_steps)
+        table["recover"] = each(config.gaits, partial(recover, lesson), on_steps)
     if "steps" in config.parts:
-        table["steps"] = _each(config.gaits, partial(step_study, lesson), on_steps)
+        table["steps"] = each(config.gaits, partial(step_study, lesson), on_steps)
     if "cost" in config.parts:
         table["cost"] = step_cost(lesson)
     return Result(config, lesson, walks, table)
 
 
-def _each(items: Sequence[K], work: Callable[[K, OnSteps], V], on_steps: OnSteps) -> dict[K, V]:
-    return dict(zip(items, in_threads(work, items, on_steps), strict=True))
-
-
-def walk_gait(lesson: WalkLesson, name: str, on_steps: OnSteps = lambda steps: None) -> Walk:
-    """A walk in one gait, the first `settle` seconds included."""
-    walker = lesson.walker()
+def walk_gait(
+    lesson: WalkLesson, name: str, on_steps: OnSteps = lambda steps: None, **options: float
+) -> Walk:
+    """A walk in one gait, the first `settle` seconds included; options are the robot's."""
+    walker = lesson.walker(**options)
     walker.start(lesson.gaits[name])
     duration = lesson.config.settle + lesson.config.walking
     walk = walker.walk(duration)
@@ -93,7 +87,7 @@ def tour(lesson: WalkLesson) -> tuple[Walker, Walk, list[tuple[float, str]]]:
     walker.start(lesson.gaits[order[0]])
     parts, events = [], []
     for index, name in enumerate(order):
-        walker.set_gait(lesson.gaits[name])
+        walker.set_readout(lesson.gaits[name].w_out)
         parts.append(walker.walk(config.before, sample=0.01, joints=True))
         events.append((index * config.before, name))
     return walker, walk_metrics.joined(parts), events
@@ -111,7 +105,7 @@ def switch(
     walker = lesson.walker(copies=config.moments)
     walker.start(lesson.gaits[first])
     walker.restore(states_at(lesson, lesson.gaits[first], moments * lesson.period(first)))
-    walker.set_gait(lesson.gaits[second])
+    walker.set_readout(lesson.gaits[second].w_out)
     walk = walker.walk(config.after, sample=0.02)
     on_steps(round((config.before + config.moments * config.after) / walker.timestep))
     found: list[float] = moments[
@@ -164,14 +158,13 @@ def push_table(config: Config, survived: Mapping[str, Mapping[float, int]]) -> T
 
 def step_study(lesson: WalkLesson, name: str, on_steps: OnSteps = lambda steps: None) -> Table:
     """Statistics of the same walk at other time steps [ms of the body as it was taught]."""
-    table: Table = {}
-    for step in lesson.config.steps_ms:
-        walker = lesson.walker(timestep=step * 1e-3 / lesson.config.pace)
-        walker.start(lesson.gaits[name])
-        walk = walker.walk(lesson.config.settle + lesson.config.walking)
-        on_steps(round(walk.times[-1] / walker.timestep))
-        table[f"{step:g}"] = walk_table(lesson, name, walk)
-    return table
+    pace = lesson.config.pace
+    return {
+        f"{step:g}": walk_table(
+            lesson, name, walk_gait(lesson, name, on_steps, timestep=step * 1e-3 / pace)
+        )
+        for step in lesson.config.steps_ms
+    }
 
 
 def step_cost(lesson: WalkLesson) -> Table:
@@ -179,9 +172,9 @@ def step_cost(lesson: WalkLesson) -> Table:
     name = lesson.config.gaits[0]
     walker = lesson.walker()
     walker.start(lesson.gaits[name])
-    planar = Simulation(lesson.body, w_out=lesson.gaits[name].swing)
+    planar = Simulation(lesson.body, w_out=get_body(lesson.config)[1][name])
     works = {
-        "scene": lambda: walker.advance(COST_STEPS),
+        "scene": lambda: walker.rollout(COST_STEPS, record=()),
         "planar": lambda: planar.rollout(COST_STEPS, record=()),
     }
     seconds = interleaved_seconds(works, COST_REPEATS)

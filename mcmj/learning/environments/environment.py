@@ -1,25 +1,22 @@
-"""Bodies and tasks as dm_control environments; needs the extra "control".
+"""Bodies, and any other reservoirs, as dm_control environments; needs the extra "control".
 
-The physics is dm_control's own Physics of the body file, with mcmj's compiled callbacks
-installed: the feedback loop runs inside MuJoCo, and the agent acts beside it. The only module
-that imports dm_control.
+The physics is dm_control's own Physics of the model, with mcmj's compiled callbacks installed: the
+feedback loop runs inside MuJoCo, and the agent acts beside it. The only module that imports
+dm_control.
 """
 
 from collections import OrderedDict
+from typing import Any
 
+import mujoco as mj
 import numpy as np
 
-from mcmj.core.body import Body
-from mcmj.core.callbacks import install
-from mcmj.core.options import Options
-from mcmj.core.readout import Readout, checked_readout
-from mcmj.core.trajectory import State
 from mcmj.learning.environments.setting import Setting
 from mcmj.learning.environments.tasks import all_tasks as all_tasks
 from mcmj.learning.environments.tasks import assign, state_on_cycle
 from mcmj.metrics.orbit_window import OrbitWindow
-from mcmj.mjcf.write import to_mjcf
-from mcmj.simulation.stepsize.limit import warn_if_unstable
+from mcmj.simulation.reservoir import Reservoir
+from mcmj.simulation.simulation import Simulation
 from mcmj.targets.limit_cycles import Target
 from mcmj.utils.errors import InvalidArgumentError
 from mcmj.utils.extras import extra
@@ -27,30 +24,32 @@ from mcmj.utils.validation import Array, as_array
 
 with extra("control", "environments need dm_control"):
     from dm_control import mujoco
+    from dm_control.mujoco import wrapper
     from dm_control.rl import control
     from dm_control.suite import base
     from dm_control.utils import rewards
     from dm_env import specs
 
-RUNAWAY_LENGTH, RUNAWAY_OUTPUT = 10.0, 100.0  # of the body's size and the target's
+RUNAWAY_LENGTH, RUNAWAY_OUTPUT = 10.0, 100.0  # of a body's size and the target's
 
 
 class Physics(mujoco.Physics):
-    """dm_control's Physics of one body, and what its readout says."""
+    """dm_control's Physics of one reservoir, and what its readout says."""
 
-    body: Body
-    w_out: Array
+    reservoir: Reservoir
     blew_up = False  # in this episode
 
     @classmethod
-    def of_body(cls, body: Body, w_out: object, setting: Setting) -> "Physics":
-        """A body with its readout (L or L + 1, n_outputs), stepped as the setting says."""
-        readout = checked_readout(body, w_out)
-        install.install(passive=setting.passive)
-        xml = to_mjcf(body, timestep=setting.timestep, integrator=setting.integrator, w_out=readout)
-        physics: Physics = cls.from_xml_string(xml)
-        physics.model.actuator_biasprm[body.n_inputs :, 0] = setting.gate
-        physics.body, physics.w_out = body, readout
+    def of_reservoir(cls, reservoir: Reservoir, gate: float) -> "Physics":
+        """The model with its readout and its feedback gate."""
+        engine = reservoir.in_mujoco
+        engine.install()
+        model, outputs = engine.batch.get_model(0), engine.channels.outputs
+        rows = reservoir.readout.rows
+        model.actuator_user[outputs, : len(rows)] = rows.T
+        model.actuator_biasprm[outputs, 0] = gate
+        physics: Physics = cls.from_model(wrapper.MjModel(model))
+        physics.reservoir = reservoir
         return physics
 
     def step(self, n_sub_steps: int = 1) -> None:
@@ -58,21 +57,26 @@ class Physics(mujoco.Physics):
         before = self.get_state()
         try:
             super().step(n_sub_steps)
-            self.forward()  # the step leaves the lengths of its start
         except control.PhysicsError:
             self.blew_up = True
             self.set_state(before)
-            with self.suppress_physics_errors():
-                self.forward()
+        self.sense()
 
-    def lengths(self) -> Array:
-        """Spring lengths (L,) now [m]."""
-        found: Array = self.data.sensordata[: self.body.n_springs].copy()
+    def sense(self) -> None:
+        """Sensors of the state as it is: a step leaves those of its start."""
+        model, data = self.model.ptr, self.data.ptr
+        mj.mj_fwdPosition(model, data)
+        mj.mj_sensorPos(model, data)
+        mj.mj_sensorVel(model, data)
+
+    def signals(self) -> Array:
+        """What the readout hears now (n_signals,)."""
+        found: Array = self.data.sensordata[self.reservoir.in_mujoco.channels.signals].copy()
         return found
 
     def outputs(self) -> Array:
         """What the readout says now (n_outputs,)."""
-        return Readout.from_rows(self.w_out, self.body.n_springs).outputs(self.lengths())
+        return self.reservoir.readout.outputs(self.signals())
 
 
 class Orbit(base.Task):
@@ -82,49 +86,52 @@ class Orbit(base.Task):
     the outputs are, not how fast they go round.
 
     Args:
+        reservoir: with its readout.
         target: the orbit; its value at each moment is observed too.
         setting: what the agent may do.
         inputs: (n_inputs,) that the agent's are added to.
-        first: an episode's start; None: rest.
+        first: MuJoCo's integration state at an episode's start; None: the model's own start.
         random: a seed or a RandomState, for the kick.
     """
 
     def __init__(
         self,
-        body: Body,
+        reservoir: Reservoir,
         target: Target,
         setting: Setting,
         inputs: Array,
-        first: State | None = None,
+        first: Array | None = None,
         random: int | np.random.RandomState = 0,
     ) -> None:
         super().__init__(random=random)
-        self.target, self.setting = target, setting
-        self._first = first
-        self._held = np.concatenate([inputs, np.zeros(body.n_outputs)])
-        limits = setting.limits(body)
-        self._channels = np.flatnonzero(limits)
-        self._limits = limits[self._channels]
-        if not self._channels.size:
+        self.target, self.setting, self._first = target, setting, first
+        self._install = reservoir.in_mujoco.install
+        at = reservoir.in_mujoco.channels
+        self._held = np.zeros(reservoir.model.nu)
+        self._held[at.inputs] = inputs
+        sizes = np.zeros(reservoir.model.nu)
+        sizes[at.inputs], sizes[at.outputs] = setting.limits
+        self._acted = [c for part in (at.inputs, at.outputs) for c in range(part.start, part.stop)]
+        self._acted = [c for c in self._acted if sizes[c] > 0]
+        self._limits = sizes[self._acted]
+        if not self._acted:
             raise InvalidArgumentError("actions", "channels that the body has", setting.actions)
         self._window = OrbitWindow(target, setting.control_timestep)
-        self._bounds = _observation_bounds(body, target)
+        self._bounds = _observation_bounds(reservoir, target)
 
     def reseed(self, seed: int) -> None:
         """Start the task's random numbers anew."""
         self.random.seed(seed)
 
     def initialize_episode(self, physics: Physics) -> None:
-        """Rest or a point of the cycle, kicked."""
-        install.install(passive=self.setting.passive)  # another package may have taken them out
-        free = physics.body.free
-        velocities = self.setting.kick * self.random.standard_normal((len(free), 2))
+        """The model's start or a point of the cycle, kicked."""
+        self._install()  # another package may have taken the callbacks out
+        kick = self.setting.kick * self.random.standard_normal(physics.model.nv)
         if self._first is not None:
-            physics.data.time = self._first.time
-            moved = self._first.positions - physics.body.positions
-            physics.data.qpos[:] = moved[free].ravel()
-            velocities += self._first.velocities[free]
-        physics.data.qvel[:] = velocities.ravel()
+            spec = mj.mjtState.mjSTATE_INTEGRATION.value
+            mj.mj_setState(physics.model.ptr, physics.data.ptr, self._first, spec)
+        physics.data.qvel[:] += kick
+        physics.sense()
         physics.blew_up = False
         self._window.clear()
         super().initialize_episode(physics)
@@ -132,7 +139,7 @@ class Orbit(base.Task):
     def before_step(self, action: Array, physics: Physics) -> None:
         """Actions beyond their bounds are clipped."""
         physics.data.ctrl[:] = self._held
-        physics.data.ctrl[self._channels] += np.clip(action, -self._limits, self._limits)
+        physics.data.ctrl[self._acted] += np.clip(action, -self._limits, self._limits)
 
     def after_step(self, physics: Physics) -> None:
         """Remember the outputs."""
@@ -145,16 +152,16 @@ class Orbit(base.Task):
         )
 
     def get_observation(self, physics: Physics) -> OrderedDict[str, Array]:
-        """Spring lengths [m], outputs, and the target's value now, clipped at their bounds."""
+        """Signals, outputs, and the target's value now, clipped at their bounds."""
         values = {
-            "lengths": physics.lengths(),
+            "signals": physics.signals(),
             "outputs": physics.outputs(),
             "target": self.target.sample([physics.time()])[0],
         }
         return OrderedDict((name, np.clip(values[name], *self._bounds[name])) for name in values)
 
     def observation_spec(self, physics: Physics) -> OrderedDict[str, specs.BoundedArray]:
-        """Lengths to 10 times the body's size, outputs to 100 times the target's."""
+        """Lengths of a body to 10 times its size, outputs to 100 times the target's."""
         return OrderedDict(
             (name, specs.BoundedArray(low.shape, np.float64, low, high, name=name))
             for name, (low, high) in self._bounds.items()
@@ -184,35 +191,33 @@ class Environment(control.Environment):
 
 
 def make(
-    body: Body,
-    w_out: object,
+    reservoir: Reservoir,
     target: Target,
     setting: Setting | None = None,
     random: int | np.random.RandomState = 0,
     *,
     inputs: object = None,
 ) -> Environment:
-    """An environment of a body with its readout.
+    """An environment of a body or any other reservoir with its readout.
 
     Args:
-        w_out: (L or L + 1, n_outputs).
+        reservoir: a Simulation or Reservoir; it is not changed.
         random: a seed or a RandomState; the same seed gives the same episodes.
         inputs: (n_inputs,) held all the time, that the agent's are added to; default: 0.
 
     Raises:
-        InvalidArgumentError: a readout, target, input or setting that does not fit the body.
+        InvalidArgumentError: a target, input or setting that does not fit the reservoir.
     """
     setting = setting or Setting()
-    if body.n_outputs != target.n_outputs:
-        raise InvalidArgumentError("body", f"{target.n_outputs} outputs", body.n_outputs)
-    constant = np.zeros(body.n_inputs) if inputs is None else inputs
-    held = as_array("inputs", constant, (body.n_inputs,))
-    options = Options(setting.timestep, setting.integrator)
-    warn_if_unstable(body, options)
-    first = state_on_cycle(body, target, held, options) if setting.start == "cycle" else None
+    if reservoir.n_outputs != target.n_outputs:
+        raise InvalidArgumentError("reservoir", f"{target.n_outputs} outputs", reservoir.n_outputs)
+    setting.check_step(reservoir.timestep)
+    constant = np.zeros(reservoir.n_inputs) if inputs is None else inputs
+    held = as_array("inputs", constant, (reservoir.n_inputs,))
+    first = state_on_cycle(reservoir, target, held) if setting.start == "cycle" else None
     return Environment(
-        Physics.of_body(body, w_out, setting),
-        Orbit(body, target, setting, held, first, random),
+        Physics.of_reservoir(reservoir, setting.gate),
+        Orbit(reservoir, target, setting, held, first, random),
         time_limit=setting.time_limit,
         control_timestep=setting.control_timestep,
         legacy_step=False,  # whole steps: a step knows its action from its start
@@ -224,28 +229,33 @@ def load(
     task: str | None = None,
     setting: Setting | None = None,
     random: int | np.random.RandomState = 0,
+    **stepping: Any,
 ) -> Environment:
     """The environment of a body by its name, or of a body file, in the manner of the suite.
 
     Args:
         name, task: as for `mcmj.learning.environments.tasks.assign`.
         setting, random: as for `make`.
+        stepping: timestep, integrator: as for Simulation.
 
     Raises:
         UnknownNameError: no such body or task.
     """
-    given = assign(name, task, setting)
-    return make(given.body, given.w_out, given.target, setting, random, inputs=given.inputs)
+    given = assign(name, task, **stepping)
+    return make(given.simulation, given.target, setting, random, inputs=given.inputs)
 
 
-def _observation_bounds(body: Body, wanted: Target) -> dict[str, tuple[Array, Array]]:
+def _observation_bounds(reservoir: Reservoir, wanted: Target) -> dict[str, tuple[Array, Array]]:
     orbit = wanted.orbit(4096)
     low, high = orbit.min(axis=0), orbit.max(axis=0)
     slack = 1e-3 * (high - low)  # between the orbit's points
-    longest = np.full(body.n_springs, RUNAWAY_LENGTH * np.ptp(body.positions, axis=0).max())
-    largest = np.full(body.n_outputs, RUNAWAY_OUTPUT * np.abs(orbit).max())
+    least, longest = np.full(reservoir.n_signals, -np.inf), np.full(reservoir.n_signals, np.inf)
+    if isinstance(reservoir, Simulation):
+        least[:] = 0.0
+        longest[:] = RUNAWAY_LENGTH * np.ptp(reservoir.body.positions, axis=0).max()
+    largest = np.full(reservoir.n_outputs, RUNAWAY_OUTPUT * np.abs(orbit).max())
     return {
-        "lengths": (np.zeros(body.n_springs), longest),
+        "signals": (least, longest),
         "outputs": (-largest, largest),
         "target": (low - slack, high + slack),
     }

@@ -9,6 +9,7 @@ import numpy as np
 
 from mcmj.learning.environments.environment import Environment, load
 from mcmj.learning.environments.setting import Setting
+from mcmj.simulation.simulation import Simulation
 from mcmj.utils.extras import extra
 from mcmj.utils.validation import Array
 
@@ -23,7 +24,7 @@ class OrbitEnv(gymnasium.Env[dict[str, Any], Array]):
     """A body that is to generate an orbit; see mcmj.learning.environments.environment.Orbit.
 
     Args:
-        name, task, setting: as for mcmj.learning.environments.environment.load.
+        name, task, setting, stepping: as for mcmj.learning.environments.environment.load.
         environment: an environment made by environment.make, instead of a name.
         render_mode: None or "rgb_array".
     """
@@ -38,8 +39,9 @@ class OrbitEnv(gymnasium.Env[dict[str, Any], Array]):
         *,
         environment: Environment | None = None,
         render_mode: str | None = None,
+        **stepping: Any,
     ) -> None:
-        self.environment = environment or load(name, task, setting)
+        self.environment = environment or load(name, task, setting, **stepping)
         self.render_mode = render_mode
         frames = round(1 / self.environment.control_timestep())
         self.metadata = {**self.metadata, "render_fps": frames}
@@ -68,10 +70,11 @@ class OrbitEnv(gymnasium.Env[dict[str, Any], Array]):
         return dict(step.observation), step.reward, terminated, step.last() and not terminated, {}
 
     def render(self) -> Any:
-        """The body from above, displacements as they are."""
+        """A body from above, displacements as they are; a model from where its camera stands."""
         if self.render_mode is None:
             return None
-        return self.environment.physics.render(480, 640, camera_id="top")
+        is_body = isinstance(self.environment.physics.reservoir, Simulation)
+        return self.environment.physics.render(480, 640, camera_id="top" if is_body else -1)
 
     def close(self) -> None:
         """Free MuJoCo's memory."""

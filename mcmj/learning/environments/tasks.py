@@ -7,18 +7,16 @@ cycle at that eps, with the input held there.
 
 import functools
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
-from mcmj.core.body import Body
-from mcmj.core.options import Options
-from mcmj.core.trajectory import State
-from mcmj.learning.environments.setting import Setting
 from mcmj.learning.lessons import Teaching
 from mcmj.learning.teaching import synchronise, teach
 from mcmj.mjcf.bundled import StoredBody, body_names, open_body
 from mcmj.mjcf.read import from_mjcf
 from mcmj.mjcf.write import to_mjcf
+from mcmj.simulation.reservoir import Reservoir
 from mcmj.simulation.simulation import Simulation
 from mcmj.targets.gaits import GAITS, LEGS
 from mcmj.targets.input_systems import QUADRATIC
@@ -36,32 +34,31 @@ class Assignment:
     """A body with its readout, and what it is to do.
 
     Attributes:
-        w_out: (L or L + 1, n_outputs).
+        simulation: of the body.
         target: the orbit.
         inputs: (n_inputs,) held all the time.
     """
 
-    body: Body
-    w_out: Array
+    simulation: Simulation
     target: Target
     inputs: Array
 
 
-def assign(name: str, task: str | None = None, setting: Setting | None = None) -> Assignment:
+def assign(name: str, task: str | None = None, **stepping: Any) -> Assignment:
     """A body by its name, or of a body file, and its task.
 
     Args:
         name: a body that comes with mcmj, or a path.
         task: default: the first that the file holds a readout for. Without one for it in the
             file the body is taught it first.
-        setting: how the body will be stepped.
+        stepping: timestep, integrator: as for Simulation.
 
     Raises:
         UnknownNameError: no such body, or no such task for it.
         InvalidArgumentError: there is no task for so many outputs.
     """
-    stored, setting = open_body(name), setting or Setting()
-    stored.take(timestep=setting.timestep, integrator=setting.integrator)
+    stored = open_body(name)
+    taken = stored.take(**stepping)
     body, readouts = stored.body, _taught_already(stored)
     if body.n_outputs not in TEACHABLE:
         raise InvalidArgumentError("body", "2 outputs, or 4 for gaits", body.n_outputs)
@@ -70,7 +67,8 @@ def assign(name: str, task: str | None = None, setting: Setting | None = None) -
     if task not in choices:
         raise UnknownNameError(f"task of {body!r}", task, set(choices))
     w_out = readouts[task] if task in readouts else _taught(to_mjcf(body), task)
-    return Assignment(body, w_out, _target(task), np.full(body.n_inputs, DRIVEN.get(task, 0.0)))
+    held = np.full(body.n_inputs, DRIVEN.get(task, 0.0))
+    return Assignment(Simulation(body, w_out=w_out, **taken), _target(task), held)
 
 
 def all_tasks() -> list[tuple[str, str]]:
@@ -78,11 +76,18 @@ def all_tasks() -> list[tuple[str, str]]:
     return [(name, task) for name in body_names() for task in _taught_already(open_body(name))]
 
 
-def state_on_cycle(body: Body, wanted: Target, inputs: Array, options: Options) -> State:
-    """Where clean teacher forcing from rest brings a body, inputs (n_inputs,) held."""
-    simulation = Simulation(body, timestep=options.timestep, integrator=options.integrator)
-    synchronise(simulation, wanted, Teaching().washout, inputs)
-    return simulation.state
+def state_on_cycle(reservoir: Reservoir, wanted: Target, inputs: Array) -> Array:
+    """Where clean teacher forcing from rest brings a reservoir, inputs (n_inputs,) held.
+
+    Returns:
+        MuJoCo's integration state (n,); the reservoir stays as it was.
+    """
+    before = reservoir.snapshot()
+    reservoir.reset()
+    synchronise(reservoir, wanted, Teaching().washout, inputs)
+    state: Array = reservoir.in_mujoco.batch.state[0].copy()
+    reservoir.restore(before)
+    return state
 
 
 def _taught_already(stored: StoredBody) -> dict[str, Array]:

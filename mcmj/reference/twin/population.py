@@ -6,7 +6,7 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 import numpy.typing as npt
 
-from mcmj.core.body import Body
+from mcmj.core.body import Body, require_plane
 from mcmj.core.rollout_arguments import Drive
 from mcmj.core.trajectory import State
 from mcmj.reference.twin.kernels import Bodies, integrate_bodies
@@ -39,7 +39,7 @@ class Population:
     an unpacked run in the last digits.
 
     Args:
-        bodies: with the same numbers of channels.
+        bodies: planar, pushed along x, with the same numbers of channels.
         readouts: one each, in any form that Readout.of takes; None: none.
         method: one of METHODS.
         timestep: control and integration step [s].
@@ -66,6 +66,8 @@ class Population:
         require_count("threads", threads, 1)
         if len(bodies) == 0:
             raise InvalidArgumentError("bodies", "at least one body", 0)
+        for body in {id(body): body for body in bodies}.values():
+            require_plane(body, "the compiled twins")
         self.bodies = list(bodies)
         self.method, self.timestep, self.threads = method, timestep, threads
         self._packed = packed

@@ -5,6 +5,7 @@ was asked for, and holds the readout exactly. MuJoCo's writer keeps six digits o
 """
 
 import json
+from pathlib import Path
 from typing import Any
 
 import mujoco
@@ -33,6 +34,12 @@ def write_reservoir(adopted: AdoptedModel, readout: Readout | None) -> str:
     with quiet_warnings():
         spec.compile()
         return str(spec.to_xml())
+
+
+def is_reservoir_file(path: str | Path) -> bool:
+    """Whether a file is one of `write_reservoir`."""
+    file = Path(path)
+    return file.is_file() and SETTINGS in file.read_text(errors="replace")
 
 
 def read_reservoir(model: Model) -> tuple[mujoco.MjSpec, dict[str, Any], Array | None]:

@@ -140,7 +140,7 @@ def _surely_stable(body: Body, step: float, scheme: Integrator, springs: str | S
     (A spring's matrix between two nodes is at most twice its part within the nodes.)
     """
     gap = body.positions[body.springs[:, 1]] - body.positions[body.springs[:, 0]]
-    lengths = np.hypot(*gap.T)
+    lengths = np.hypot.reduce(gap, axis=1)
     x1 = lengths - body.rest_lengths
     k, d, tension = slopes(body, x1, np.zeros_like(x1), springs)
     k_top = _largest_at_node(body, np.maximum(k, tension / lengths))

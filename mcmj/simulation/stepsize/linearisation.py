@@ -8,9 +8,10 @@ Small motions (q, v) about a configuration with spring axes n and transverse dir
     D = sum_j q'(x2_j) J_j^T J_j        damping,             q' = d1 + 3 d3 x2^2
     F = -w_fb diag(g) W_out^T J         what the closed loop adds; not symmetric
 
-J_j = dl_j/dq and T_j = l_j dphi_j/dq (1, 2 n) are the spring's axis and the normal to it,
-with opposite signs at its two ends. Coordinates are (x, y) of each free node in node order,
-as MuJoCo's. Left out: the terms of first order in the velocities of turning springs.
+J_j = dl_j/dq and T_j = l_j dphi_j/dq are the spring's axis and the normals to it (one in the
+plane, two in space), with opposite signs at its two ends. Coordinates are (x, y) or (x, y, z) of
+each free node in node order, as MuJoCo's. Left out: the terms of first order in the velocities
+of turning springs.
 
 For motions that are not small the secants p(x1) / x1 = k1 + k3 x1^2, q(x2) / x2 = d1 + d3 x2^2
 take the place of p' and q': with a damper alone, v+ = v - h q(v) / m grows if h q(v) / v > 2 m,
@@ -35,7 +36,7 @@ _NUDGE = 1e-6  # of a callback law's argument, for its slope by central differen
 
 @dataclass(frozen=True)
 class Linearised:
-    """M v' = -(K + G + F) q - D v; n = 2 x free nodes.
+    """M v' = -(K + G + F) q - D v; n = dimensions x free nodes.
 
     Attributes:
         masses: (n,) [kg].
@@ -44,6 +45,7 @@ class Linearised:
         tangent_material, tangent_damping: K and D with tangents, which are what an implicit
             integrator solves for.
         known: whether it knows them: native springs, not a callback's.
+        dimensions: coordinates of a node, 2 or 3.
     """
 
     masses: Array
@@ -54,6 +56,7 @@ class Linearised:
     tangent_material: csr_array
     tangent_damping: csr_array
     known: bool = True
+    dimensions: int = 2
 
     @property
     def stiffness(self) -> csr_array:
@@ -104,7 +107,7 @@ def linear_system(
 
     Args:
         body: the body.
-        positions: (N, 2) where to linearise [m]; default: the start.
+        positions: (N, D) where to linearise [m]; default: the start.
         motion: the size of its motions.
         w_out: readout (L, n_outputs), or with a bias in the last row; None: open loop.
         gate: (n_outputs,) or a number: 1 closes the channels, 0 opens them.
@@ -114,7 +117,7 @@ def linear_system(
         InvalidArgumentError, UnknownNameError: an argument out of bounds.
     """
     start = body.positions if positions is None else positions
-    where = as_array("positions", start, (body.n_nodes, 2))
+    where = as_array("positions", start, body.positions.shape)
     tail, head = body.springs.T
     gap = where[head] - where[tail]
     lengths = np.maximum(np.linalg.norm(gap, axis=1), np.finfo(float).tiny)
@@ -125,21 +128,24 @@ def linear_system(
     fastest = _amplitudes("speed", motion.speed, body)
     p_tangent, q_tangent, tension = slopes(body, widest, fastest, springs)
     along = _spring_rows(body, axis)
-    across = _spring_rows(body, np.stack([-axis[:, 1], axis[:, 0]], axis=1))
     tangent_material, tangent_damping = _assembled(along, p_tangent), _assembled(along, q_tangent)
     material, damping = tangent_material, tangent_damping
     if motion.secant:
         p_secant, q_secant, _ = slopes(body, widest, fastest, springs, secant=True)
         material, damping = _assembled(along, p_secant), _assembled(along, q_secant)
     return Linearised(
-        masses=np.repeat(body.masses[body.free], 2),
+        masses=np.repeat(body.masses[body.free], body.dimensions),
         material=material,
-        geometric=_assembled(across, tension / (lengths + further)),
+        geometric=sum(
+            _assembled(_spring_rows(body, normal), tension / (lengths + further))
+            for normal in _normals(axis)
+        ),
         damping=damping,
         feedback=_feedback(body, along, w_out, gate),
         tangent_material=tangent_material,
         tangent_damping=tangent_damping,
         known=spring_law(springs) is None,
+        dimensions=body.dimensions,
     )
 
 
@@ -189,16 +195,26 @@ def _away(values: Array, by: Array) -> Array:
     return values + np.where(values < 0, -by, by)
 
 
+def _normals(axis: Array) -> list[Array]:
+    """Unit vectors (L, D) at right angles to unit vectors (L, D), and to each other."""
+    if axis.shape[1] == 2:
+        return [np.stack([-axis[:, 1], axis[:, 0]], axis=1)]
+    aside = np.cross(axis, np.eye(3)[np.abs(axis).argmin(axis=1)])
+    first = aside / np.linalg.norm(aside, axis=1)[:, None]
+    return [first, np.cross(axis, first)]
+
+
 def _spring_rows(body: Body, direction: Array) -> csr_array:
-    """(L, n): each spring's unit direction (L, 2) at its head, its opposite at its tail."""
+    """(L, n): each spring's unit direction (L, D) at its head, its opposite at its tail."""
+    d = body.dimensions
     column = np.full(body.n_nodes, -1)
     column[body.free] = np.arange(len(body.free))
     ends = column[body.springs]
-    spring = np.broadcast_to(np.arange(body.n_springs)[:, None, None], (*ends.shape, 2))
-    columns = 2 * ends[:, :, None] + np.arange(2)
+    spring = np.broadcast_to(np.arange(body.n_springs)[:, None, None], (*ends.shape, d))
+    columns = d * ends[:, :, None] + np.arange(d)
     values = direction[:, None, :] * np.array([-1.0, 1.0])[None, :, None]
     free = np.broadcast_to((ends >= 0)[:, :, None], columns.shape)
-    shape = (body.n_springs, 2 * len(body.free))
+    shape = (body.n_springs, d * len(body.free))
     return csr_array((values[free], (spring[free], columns[free])), shape=shape)
 
 
@@ -207,7 +223,7 @@ def _assembled(rows: csr_array, weights: Array) -> csr_array:
 
 
 def _feedback(body: Body, along: csr_array, w_out: object, gate: object) -> csr_array:
-    """F = -w_fb diag(g) W_out^T J [N/m]: x forces only."""
+    """F = -(w_fb e) diag(g) W_out^T J [N/m]: forces along the body's direction e."""
     n = along.shape[1]
     if w_out is None or body.n_outputs == 0:
         return csr_array((n, n))
@@ -215,5 +231,7 @@ def _feedback(body: Body, along: csr_array, w_out: object, gate: object) -> csr_
     shape = (body.n_outputs,)
     gates = as_array("gate", np.broadcast_to(np.asarray(gate), shape), shape)
     push = np.zeros((n, body.n_outputs))
-    push[::2] = body.w_fb[body.free] * gates
+    for i, share in enumerate(body.direction):
+        if share:
+            push[i :: body.dimensions] = share * (body.w_fb[body.free] * gates)
     return csr_array(-push @ (along.T @ weights).T)

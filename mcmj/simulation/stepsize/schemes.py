@@ -12,7 +12,7 @@ leapfrog takes the mean of f and the one before):
 
 Found by measurement on MuJoCo 3.17 (tests/test_steplimit.py repeats it): its implicit
 integrators drop what a spring's damper couples between two nodes, for lack of room in their
-sparse matrix, and implicitfast even between x and y of one node. What callback springs push
+sparse matrix, and implicitfast even between the coordinates of one node. What callback springs push
 with, no integrator knows: B = D = K = 0 on the left, and all of those are Euler.
 
 With K, G, D symmetric and K, D not negative, all but RK4 lose stability by an oscillation
@@ -45,18 +45,19 @@ def pencil(system: Linearised, scheme: str) -> tuple[csr_array, csr_array]:
     if scheme == "discrete":
         stiffness = stiffness - 2 * system.tangent_material
     factor = INTEGRATORS[scheme].damping_factor
-    return stiffness, factor * damping - 4 * known_damping(system.tangent_damping, scheme)
+    return stiffness, factor * damping - 4 * known_damping(system, scheme)
 
 
-def known_damping(damping: csr_array, scheme: str) -> csr_array:
+def known_damping(system: Linearised, scheme: str) -> csr_array:
     """B: the part of D (n, n) that an implicit integrator solves for."""
+    damping, d = system.tangent_damping, system.dimensions
     n = damping.shape[0]
     if scheme == "discrete":
         return damping
     if scheme == "implicitfast":
         return csr_array(diags_array(damping.diagonal()))
     if scheme == "implicit":
-        same_node = kron(diags_array(np.ones(n // 2)), np.ones((2, 2)))
+        same_node = kron(diags_array(np.ones(n // d)), np.ones((d, d)))
         return csr_array(damping.multiply(same_node))
     return csr_array((n, n))
 
@@ -81,7 +82,7 @@ def _free_and_held(system: Linearised, scheme: str, h: float) -> tuple[Array, Ar
         inverse = one / mass[:, None]
         A = np.block([[zero, one], [-inverse @ stiffness, -inverse @ damping]])
         return _rk4(h * A, h * np.vstack([zero, inverse]))
-    metric = np.diag(mass) + h * known_damping(system.tangent_damping, scheme).toarray()
+    metric = np.diag(mass) + h * known_damping(system, scheme).toarray()
     on_v = damping
     if scheme == "discrete":
         material = system.tangent_material.toarray()

@@ -49,7 +49,8 @@ def checked_trajectory(times: object, recorded: Mapping[str, object]) -> Traject
         if name in recorded:
             axes = -TIME_AXIS[name]  # without that of an ensemble's copies
             lead = (None,) if np.asarray(recorded[name]).ndim > axes else ()
-            rest = (None,) if axes == 2 else (None, 2)
+            dimensions = 3 if np.asarray(recorded[name]).shape[-1:] == (3,) else 2
+            rest = (None,) if axes == 2 else (None, dimensions)
             arrays[name] = _numbers(name, recorded[name], (*lead, len(instants), *rest))
             copies.add(arrays[name].shape[:-axes])
     if len(copies) > 1:

@@ -3,7 +3,7 @@
 Needs the extra "files" (h5py). Schema of OpenPRC 0.1 (its README, section 3.1.6), float32:
 
     attributes  total_frames, frame_rate [1/s], dt [s]
-    time_series/time (T,)   nodes/positions, nodes/velocities (T, N, 3), z = 0
+    time_series/time (T,)   nodes/positions, nodes/velocities (T, N, 3), z = 0 of planar bodies
     elements/bars/strain (T, L): l / l0 - 1
 
 Bodies are not exchanged: OpenPRC's bars are linear, and its geometry.h5 has no place for cubic
@@ -39,7 +39,7 @@ def save_openprc(path: str | Path, trajectory: Trajectory, body: Body) -> None:
     """
     positions = trajectory.positions
     if positions is None or positions.ndim != 3 or len(trajectory) < 2:
-        raise InvalidArgumentError("trajectory", "positions (T, N, 2) of one run, T >= 2", "none")
+        raise InvalidArgumentError("trajectory", "positions (T, N, D) of one run, T >= 2", "none")
     step = float(trajectory.times[1] - trajectory.times[0])
     strain = spring_lengths(positions, body.springs) / body.rest_lengths - 1.0
     arrays = {
@@ -56,11 +56,12 @@ def save_openprc(path: str | Path, trajectory: Trajectory, body: Body) -> None:
 
 
 def load_openprc(path: str | Path) -> Trajectory:
-    """Read the times, positions and velocities of a planar simulation.h5.
+    """Read the times, positions and velocities of a simulation.h5.
+
+    They are (T, N, 2) of nodes that never leave the plane z = 0, else (T, N, 3).
 
     Raises:
-        TrajectoryFileError: no such file, damaged, not OpenPRC's, one that leads to other files,
-            or nodes that leave the plane z = 0.
+        TrajectoryFileError: no such file, damaged, not OpenPRC's, or one that leads to other files.
     """
     if not Path(path).is_file():  # a pipe would be waited for
         raise TrajectoryFileError(f"no such trajectory file: {path}")
@@ -71,9 +72,12 @@ def load_openprc(path: str | Path) -> Trajectory:
             )
         if times is None or positions is None:
             raise TrajectoryFileError(f"{path}: expected {_TIME} and {_POSITIONS} in it")
-        recorded = {"positions": _planar(positions)}
+        recorded = {"positions": positions}
         if velocities is not None:
-            recorded["velocities"] = _planar(velocities)
+            recorded["velocities"] = velocities
+        arrays = [as_array("nodes", array, (None, None, 3)) for array in recorded.values()]
+        if not any(array[..., 2].any() for array in arrays):
+            recorded = {name: np.ascontiguousarray(a[..., :2]) for name, a in recorded.items()}
         return checked_trajectory(times, recorded)
 
 
@@ -108,13 +112,6 @@ def _is_whole(dataset: h5py.Dataset) -> bool:
     return bool(dataset.id.get_num_chunks() >= math.prod(chunks))
 
 
-def _planar(array: Array) -> Array:
-    """(T, N, 2) of (T, N, 3) with z = 0."""
-    spatial = as_array("nodes", array, (None, None, 3))
-    if np.abs(spatial[..., 2]).max(initial=0.0) > 0.0:
-        raise InvalidArgumentError("nodes", "the plane z = 0", "nodes that leave the plane")
-    return np.ascontiguousarray(spatial[..., :2])
-
-
-def _with_z(planar: Array) -> Array:
-    return np.concatenate([planar, np.zeros((*planar.shape[:-1], 1))], axis=-1)
+def _with_z(array: Array) -> Array:
+    """(T, N, 3) of (T, N, D), z = 0 if there is none."""
+    return np.concatenate([array, np.zeros((*array.shape[:-1], 3 - array.shape[-1]))], axis=-1)

@@ -1,6 +1,6 @@
 """Trajectories as xarray Datasets and Zarr folders: named axes with units, written in chunks.
 
-Needs the extra "files" (xarray, zarr). Axes: time [s], spring, node, axis (x, then y), output,
+Needs the extra "files" (xarray, zarr). Axes: time [s], spring, node, axis (x, y, z), output,
 and copy for copies; of a model that is no body, its joints and sensors.
 `xarray.open_zarr(path)` reads a long run lazily.
 """
@@ -32,7 +32,7 @@ _AXES = {
     "sensordata": ("time", "sensordata"),
 }
 # not a coordinate of strings: Zarr has no stable format for those
-_NOTES = {"positions": {"axis": "x, y"}, "velocities": {"axis": "x, y"}}
+_NOTES = {2: {"axis": "x, y"}, 3: {"axis": "x, y, z"}}
 _UNITS = {"lengths": "m", "outputs": "1", "positions": "m", "velocities": "m/s"}  # of a body
 
 
@@ -43,7 +43,8 @@ def to_dataset(trajectory: Trajectory) -> xarray.Dataset:
         array = getattr(trajectory, name)
         if array is not None:
             axes = _AXES[name] if array.ndim == len(_AXES[name]) else ("copy", *_AXES[name])
-            variables[name] = (axes, array, {"units": _UNITS.get(name, "")} | _NOTES.get(name, {}))
+            note = _NOTES[array.shape[-1]] if "axis" in axes else {}
+            variables[name] = (axes, array, {"units": _UNITS.get(name, "")} | note)
     time = ("time", trajectory.times, {"units": "s", "long_name": "time at the start of the step"})
     return xarray.Dataset(variables, coords={"time": time})
 

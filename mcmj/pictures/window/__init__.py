@@ -1,0 +1,1 @@
+"""MuJoCo's interactive viewer on a closed loop."""
