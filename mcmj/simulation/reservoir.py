@@ -54,6 +54,8 @@ class Reservoir(Loop):
         InvalidArgumentError, UnknownNameError: an argument out of bounds, an unknown name.
     """
 
+    _alterations: tuple[tuple[Sequence[Any], Any], ...] = ()  # all that `alter` was given
+
     def __init__(
         self,
         model: Model,
@@ -79,10 +81,6 @@ class Reservoir(Loop):
         engine = ModelEngine(self._adopted, copies=1 if copies is None else copies, threads=threads)
         self._begin(engine, w_out, copies)
 
-    def _begin(self, engine: Engine, w_out: object, copies: int | None) -> None:
-        self._alterations: tuple[tuple[Sequence[Any], Any], ...] = ()
-        super()._begin(engine, w_out, copies)
-
     def with_copies(self, copies: int, threads: int = 1, *, lenient: bool = False) -> Self:
         """Independent copies of this reservoir at its start, cuts, masses and readout as they are.
 
@@ -97,7 +95,7 @@ class Reservoir(Loop):
         if self._copies is not None:
             raise InvalidArgumentError("reservoir", "one without copies", f"{self._copies}")
         other = copy.copy(self)
-        other._driven = False
+        other._driven, other._alterations = False, ()
         other._begin(self._new_engine(copies, threads), self._w_out, copies)
         if lenient:
             other._engine.leave_behind()
@@ -151,12 +149,6 @@ class Reservoir(Loop):
     def input_names(self) -> tuple[str, ...]:
         """Of the inputs."""
         return self._adopted.input_names
-
-    @property
-    def late_signals(self) -> tuple[str, ...]:
-        """Names of the signals that are heard as they were one step before."""
-        pairs = zip(self.signal_names, self._adopted.late, strict=True)
-        return tuple(name for name, late in pairs if late)
 
     @property
     def feedback_delay(self) -> int:

@@ -110,11 +110,6 @@ class Simulation(Reservoir):
         return tuple(f"in{c}" for c in range(self.body.n_inputs))
 
     @property
-    def late_signals(self) -> tuple[str, ...]:
-        """None: lengths are those of the moment."""
-        return ()
-
-    @property
     def feedback_delay(self) -> int:
         """Steps between a length and the force it feeds back."""
         return self.options.feedback_delay

@@ -6,6 +6,7 @@ import mujoco
 import numpy as np
 import pytest
 from scipy.linalg import expm
+from scipy.spatial.transform import Rotation
 
 import mcmj
 from mcmj.analysis.loops.chart import Chart
@@ -273,6 +274,22 @@ def test_a_planar_body_moves_in_mujoco_as_in_the_twin(body, w_bias):
     np.testing.assert_allclose(other, variational(twin, z, 0.1005)[1], atol=1e-6)
     np.testing.assert_allclose(loop.outputs(moved.state[None]), twin.outputs(z[None]), rtol=1e-12)
     np.testing.assert_allclose(twin.scales(z + one), loop.scales(moved.state + one), rtol=1e-9)
+
+
+def test_a_body_in_space_that_is_turned_has_the_same_multipliers():
+    body = mcmj.random_body(0, nodes=8, depth=100)
+    turn = Rotation.from_rotvec([0.3, -1.0, 0.7]).as_matrix()
+    w_out = 0.05 * np.random.default_rng(0).standard_normal((body.n_springs, body.n_outputs))
+    arrays = {name: getattr(body, name) for name in body.__dataclass_fields__}
+    turned = {name: arrays[name] @ turn.T for name in ("positions", "direction")}
+    found = []
+    for one in (body, mcmj.Body(**arrays | turned)):
+        loop = ReservoirLoop(mcmj.Simulation(one, w_out=w_out))
+        assert loop.left_out == ()
+        cycle = replace(at_rest(loop, 1.0), scale=np.full(loop.size, 0.1))
+        found.append(np.sort_complex(np.linalg.eigvals(differences(loop, cycle))))
+    assert len(found[0]) == 6 * len(body.free)
+    np.testing.assert_allclose(found[1], found[0], atol=5e-9)
 
 
 @pytest.mark.slow

@@ -62,15 +62,14 @@ def check_memoryless(reservoir: Reservoir) -> None:
         InvalidArgumentError: delayed feedback, sensors heard late, the leapfrog, substeps, or a
             model with delays or plugins of its own; also a reservoir with copies, or the twin.
     """
-    if reservoir.copies is not None:
-        raise InvalidArgumentError("reservoir", "one without copies", reservoir.copies)
-    model = reservoir.model
+    engine = reservoir.in_mujoco
+    model, late = engine.model, np.flatnonzero(engine.channels.late)
     if reservoir.feedback_delay:
         raise InvalidArgumentError("feedback_delay", "0, without memory", reservoir.feedback_delay)
-    if reservoir.late_signals:
-        late = ", ".join(reservoir.late_signals)
+    if late.size:
+        names = ", ".join(reservoir.signal_names[i] for i in late)
         wanted = "those that MuJoCo computes before actuation; others are heard a step late"
-        raise InvalidArgumentError("sensors", wanted, late)
+        raise InvalidArgumentError("sensors", wanted, names)
     if isinstance(reservoir, Simulation):
         options = reservoir.options
         if integrator_named(options.integrator).by_callback:

@@ -11,7 +11,7 @@ from typing import Any, Self
 
 import numpy as np
 
-from mcmj.analysis.loops.closed_loops import LoopRun, advanced
+from mcmj.analysis.loops.loop_map import LoopRun, advanced
 from mcmj.analysis.loops.placed_copies import PlacedCopies
 from mcmj.analysis.loops.symmetries import cyclic_coordinates
 from mcmj.core.readout import Readout

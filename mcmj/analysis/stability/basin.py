@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from mcmj.analysis.loops.closed_loops import Loop
+from mcmj.analysis.loops.loop_map import LoopMap
 from mcmj.analysis.stability.cycle import Cycle
 from mcmj.metrics import orbits
 from mcmj.targets.limit_cycles import Target
@@ -76,7 +76,7 @@ class Survey:
 
 
 def survey(
-    loop: Loop,
+    loop: LoopMap,
     target: Target,
     states: Array,
     *,
@@ -126,13 +126,13 @@ def judge(
     return Survey(errors, times, threshold)
 
 
-def on_cycle(loop: Loop, cycle: Cycle, count: int) -> Array:
+def on_cycle(loop: LoopMap, cycle: Cycle, count: int) -> Array:
     """States (count, n) spread evenly over the cycle, in time."""
     stride = max(1, round(cycle.period / loop.timestep / count))
     return loop.trail(cycle.state, stride, count)
 
 
-def kicked(loop: Loop, cycle: Cycle, strengths: Array, generator: np.random.Generator) -> Array:
+def kicked(loop: LoopMap, cycle: Cycle, strengths: Array, generator: np.random.Generator) -> Array:
     """States (B, n) of the cycle, with velocity kicks in random directions.
 
     Args:
@@ -147,7 +147,7 @@ def kicked(loop: Loop, cycle: Cycle, strengths: Array, generator: np.random.Gene
 
 
 def pushed(
-    loop: Loop, states: Array, forces: Array | None, duration: float, *, refine: int = 1
+    loop: LoopMap, states: Array, forces: Array | None, duration: float, *, refine: int = 1
 ) -> Array:
     """States (B, n) after constant forces (B, n_forces); NaN for those that blew up.
 
@@ -165,7 +165,7 @@ def pushed(
 
 
 def scaled_starts(
-    loop: Loop, target: Target, scales: Array, phases: Array, *, duration: float
+    loop: LoopMap, target: Target, scales: Array, phases: Array, *, duration: float
 ) -> Array:
     """States (B, n) that a teacher of `scales` (B,) times the target brings the loop to.
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import brentq
 
-from mcmj.analysis.loops.closed_loops import Loop
+from mcmj.analysis.loops.loop_map import LoopMap
 from mcmj.metrics import orbits
 from mcmj.utils.errors import McmjError
 from mcmj.utils.validation import Array, require_number
@@ -47,7 +47,7 @@ def weights_at(fraction: float) -> Array:
     return np.linalg.solve(matrix, fraction ** np.arange(4.0))
 
 
-def around(loop: Loop, states: Array, steps: int) -> Array:
+def around(loop: LoopMap, states: Array, steps: int) -> Array:
     """States (4, B, n) after steps - 1, ..., steps + 2 steps."""
     rows = [loop.advance(states, steps - 1)]
     for _ in range(3):
@@ -55,7 +55,7 @@ def around(loop: Loop, states: Array, steps: int) -> Array:
     return np.stack(rows)
 
 
-def flow_map(loop: Loop, states: Array, duration: float) -> Array:
+def flow_map(loop: LoopMap, states: Array, duration: float) -> Array:
     """States (B, n) after any duration [s] of at least two steps, interpolated between steps.
 
     Raises:
@@ -67,7 +67,7 @@ def flow_map(loop: Loop, states: Array, duration: float) -> Array:
 
 
 def find_cycle(
-    loop: Loop,
+    loop: LoopMap,
     start: Array,
     guess: float,
     *,
@@ -100,7 +100,7 @@ def find_cycle(
     )
 
 
-def _cycle_at(loop: Loop, state: Array, guess: float) -> Cycle:
+def _cycle_at(loop: LoopMap, state: Array, guess: float) -> Cycle:
     h = loop.timestep
     outputs = loop.run(state, round(6 * guess / h)).outputs[0]
     rough = orbits.period(outputs, h, guess)

@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.integrate import solve_ivp
 
-from mcmj.analysis.loops.closed_loops import Loop
+from mcmj.analysis.loops.loop_map import LoopMap
 from mcmj.analysis.stability.cycle import Cycle, flow_map
 from mcmj.analysis.stability.loop import ClosedLoop
 from mcmj.analysis.stability.variational import variational
@@ -83,7 +83,7 @@ class Floquet(Multipliers):
     disagreement: float
 
 
-def differences(loop: Loop, cycle: Cycle, eps: float = DIFFERENCE) -> Array:
+def differences(loop: LoopMap, cycle: Cycle, eps: float = DIFFERENCE) -> Array:
     """Monodromy matrix (n, n) by central differences, 2 n copies at once.
 
     Args:
@@ -112,7 +112,7 @@ def multipliers(monodromy: Array) -> tuple[Complex, Complex]:
     return values[order], vectors[:, order]
 
 
-def multipliers_of(loop: Loop, cycle: Cycle) -> Multipliers:
+def multipliers_of(loop: LoopMap, cycle: Cycle) -> Multipliers:
     """Multipliers of a cycle of any loop, by differences.
 
     Raises:

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from mcmj.analysis.loops.closed_loops import LoopRun, advanced
+from mcmj.analysis.loops.loop_map import LoopRun, advanced
 from mcmj.core.body import Body, require_plane, spring_lengths
 from mcmj.core.readout import Readout, checked_readout
 from mcmj.core.rollout_arguments import check_drive

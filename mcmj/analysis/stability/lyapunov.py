@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mcmj.analysis.loops.closed_loops import Loop
+from mcmj.analysis.loops.loop_map import LoopMap
 from mcmj.utils.seeds import stream
 from mcmj.utils.validation import Array, require_count, require_number
 
@@ -37,7 +37,7 @@ class Exponent:
 
 
 def lyapunov_exponent(
-    loop: Loop,
+    loop: LoopMap,
     state: Array,
     *,
     interval: float,

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import cKDTree
 
-from mcmj.analysis.loops.closed_loops import Loop
+from mcmj.analysis.loops.loop_map import LoopMap
 from mcmj.analysis.stability.cycle import Cycle
 from mcmj.utils.errors import InvalidArgumentError
 from mcmj.utils.seeds import stream
@@ -51,7 +51,7 @@ class Diffusion:
 
 
 def fed_back_noise(
-    loop: Loop, generator: np.random.Generator, deviations: Array, steps: int
+    loop: LoopMap, generator: np.random.Generator, deviations: Array, steps: int
 ) -> Array:
     """Offsets (B, T, n_outputs) that white noise (B,) on all signals amounts to ([m]: lengths)."""
     if loop.w_out is None:
@@ -65,7 +65,7 @@ def fed_back_noise(
 
 
 def phase_diffusion(
-    loop: Loop,
+    loop: LoopMap,
     cycle: Cycle,
     noise: float,
     *,
@@ -105,7 +105,7 @@ class _Phases:
     """Phases (B,) [s] of states (B, n): the nearest of many states of the cycle, then the foot
     of the perpendicular on the tangent there."""
 
-    def __init__(self, loop: Loop, cycle: Cycle) -> None:
+    def __init__(self, loop: LoopMap, cycle: Cycle) -> None:
         stride = max(1, round(cycle.period / loop.timestep / POINTS))
         count = int(cycle.period / loop.timestep / stride)
         self._scale, self._spacing = cycle.scale, stride * loop.timestep

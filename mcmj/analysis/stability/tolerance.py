@@ -7,7 +7,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.stats import binom
 
-from mcmj.analysis.loops.closed_loops import Loop
+from mcmj.analysis.loops.loop_map import LoopMap
 from mcmj.analysis.stability.basin import pushed, survey
 from mcmj.analysis.stability.phase import fed_back_noise
 from mcmj.targets.limit_cycles import Target
@@ -102,7 +102,7 @@ def largest_tolerated(
 
 
 def force_tolerance(
-    loop: Loop,
+    loop: LoopMap,
     target: Target,
     states: Array,
     trial: Trial,
@@ -128,7 +128,7 @@ def force_tolerance(
 
 
 def noise_tolerance(
-    loop: Loop,
+    loop: LoopMap,
     target: Target,
     states: Array,
     trial: Trial,
@@ -151,6 +151,6 @@ def noise_tolerance(
     return largest_tolerated(recovers, len(states), *NOISES, ratio=trial.ratio)
 
 
-def _recovered(loop: Loop, target: Target, states: Array, trial: Trial) -> npt.NDArray[np.bool_]:
+def _recovered(loop: LoopMap, target: Target, states: Array, trial: Trial) -> npt.NDArray[np.bool_]:
     found = survey(loop, target, states, duration=trial.recovery, threshold=trial.threshold)
     return found.recovered

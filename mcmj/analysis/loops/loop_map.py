@@ -32,7 +32,7 @@ class LoopRun:
     alive: npt.NDArray[np.bool_]
 
 
-class Loop(Protocol):
+class LoopMap(Protocol):
     """A closed loop; states are rows (B, n) of plain numbers, and may be added and interpolated."""
 
     @property
@@ -90,7 +90,7 @@ class Loop(Protocol):
         """The same loop with steps that much smaller."""
 
 
-def advanced(loop: Loop, states: Array, steps: int) -> Array:
+def advanced(loop: LoopMap, states: Array, steps: int) -> Array:
     """States (B, n) after some undisturbed steps (0 or more).
 
     Raises:
