@@ -36,6 +36,7 @@ class Channels(NamedTuple):
         pushed: the degrees of freedom that each of them acts on, and its share there.
         signals: (n_signals,) where they stand in sensordata.
         late: (n_signals,) bool: MuJoCo computes it after actuation.
+        kept: (n,) in sensordata, what is part of a snapshot, see mcmj.simulation.models.adopt.
     """
 
     inputs: slice
@@ -44,6 +45,7 @@ class Channels(NamedTuple):
     pushed: Sequence[tuple[npt.NDArray[np.int64], float]]
     signals: npt.NDArray[np.int64]
     late: npt.NDArray[np.bool_]
+    kept: npt.NDArray[np.int64]
 
 
 class BatchEngine:

@@ -62,6 +62,7 @@ class BodyEngine(BatchEngine):
             # the last L sensors are never delayed or held
             signals=np.arange(model.nsensordata - body.n_springs, model.nsensordata),
             late=np.zeros(body.n_springs, dtype=np.bool_),
+            kept=np.zeros(0, dtype=np.int64),
         )
         super().__init__(
             model, channels, timestep=timestep, substeps=substeps, copies=copies, threads=threads

@@ -85,11 +85,10 @@ def run_corrected(
 
 
 def _data_of(engine: BatchEngine, model: mujoco.MjModel) -> mujoco.MjData:
-    """Data at the engine's state; its snapshot is late signals, MuJoCo's state, steps done."""
-    data, channels, snapshot = mujoco.MjData(model), engine.channels, engine.snapshot()[0]
-    late = channels.signals[channels.late]
-    mujoco.mj_setState(model, data, snapshot[len(late) : -1], _STATE)
-    data.sensordata[late] = snapshot[: len(late)]
+    """Data at the engine's state; its snapshot is what is kept, MuJoCo's state, steps done."""
+    data, kept, snapshot = mujoco.MjData(model), engine.channels.kept, engine.snapshot()[0]
+    mujoco.mj_setState(model, data, snapshot[len(kept) : -1], _STATE)
+    data.sensordata[kept] = snapshot[: len(kept)]
     data.ctrl[:] = 0.0
     data.qfrc_applied[:] = 0.0
     data.xfrc_applied[:] = 0.0
@@ -98,10 +97,10 @@ def _data_of(engine: BatchEngine, model: mujoco.MjModel) -> mujoco.MjData:
 
 def _put_back(engine: BatchEngine, model: mujoco.MjModel, data: mujoco.MjData, steps: int) -> None:
     """The engine goes on from the data, so many steps later."""
-    late = data.sensordata[engine.channels.signals[engine.channels.late]]
+    kept = data.sensordata[engine.channels.kept]
     state = np.empty(mujoco.mj_stateSize(model, _STATE))
     mujoco.mj_getState(model, data, state, _STATE)
-    engine.restore(np.concatenate([late, state, [engine.steps_done + steps]])[None])
+    engine.restore(np.concatenate([kept, state, [engine.steps_done + steps]])[None])
 
 
 def _machine(engine: BatchEngine, model: mujoco.MjModel, data: mujoco.MjData) -> Machine:

@@ -21,7 +21,7 @@ class ModelEngine(BatchEngine):
     """MuJoCo's side of a reservoir; see Reservoir for the arguments.
 
     Sensors that MuJoCo computes after actuation are heard late, as they were one step before; the
-    engine keeps what was heard last, for snapshots and records.
+    engine keeps them from chunk to chunk, for the law, snapshots and records.
     """
 
     recordable: tuple[str, ...] = ("signals", "qpos", "qvel", "sensordata")
@@ -32,7 +32,7 @@ class ModelEngine(BatchEngine):
         self.adopted = adopted
         first, n_outputs = adopted.first, len(adopted.channel_names)
         dofs = np.arange(adopted.model.nv)
-        self._heard_late = np.zeros((copies, int(adopted.late.sum())))
+        self._kept = np.zeros((copies, len(adopted.kept)))
         channels = Channels(
             inputs=slice(first + n_outputs, first + n_outputs + len(adopted.input_names)),
             outputs=slice(first, first + n_outputs),
@@ -40,6 +40,7 @@ class ModelEngine(BatchEngine):
             pushed=[(dofs, 1.0)],
             signals=adopted.signals,
             late=adopted.late,
+            kept=adopted.kept,
         )
         timestep = float(adopted.model.opt.timestep)
         super().__init__(adopted.model, channels, timestep=timestep, copies=copies, threads=threads)
@@ -78,7 +79,7 @@ class ModelEngine(BatchEngine):
     def reset(self) -> None:
         """All copies back to the model's start, time 0."""
         super().reset()
-        self._heard_late[:] = 0.0
+        self._kept[:] = 0.0
 
     def set_state(self, qpos: object, qvel: object) -> None:
         """Joints' positions (nq,) and velocities (nv,), or (copies, ..); None: as they are."""
@@ -88,8 +89,8 @@ class ModelEngine(BatchEngine):
                 self.bound(name)[:] = as_array(name, value, (*lead, size))
 
     def snapshot(self) -> Array:
-        """Full integration state (copies, n), and what was heard late."""
-        return np.hstack([self._heard_late, super().snapshot()])
+        """What is kept of late sensors, then the full integration state (copies, n)."""
+        return np.hstack([self._kept, super().snapshot()])
 
     def restore(self, snapshot: Array) -> None:
         """Continue from a snapshot, bit for bit.
@@ -97,14 +98,14 @@ class ModelEngine(BatchEngine):
         Raises:
             InvalidArgumentError: another shape.
         """
-        late = self._heard_late.shape[1]
-        super().restore(snapshot[:, late:])
-        self._heard_late[:] = snapshot[:, :late]
+        kept = self._kept.shape[1]
+        super().restore(snapshot[:, kept:])
+        self._kept[:] = snapshot[:, :kept]
 
     def current_signals(self) -> Array:
         """Signals (copies, n_signals) of the state as it is, late ones as they would be heard."""
         found: Array = self.sensors_now()[:, self.adopted.signals].copy()
-        found[:, self.adopted.late] = self._heard_late
+        found[:, self.adopted.late] = self._recorded_late
         return found
 
     # --- stepping ----------------------------------------------------------------------------
@@ -123,23 +124,28 @@ class ModelEngine(BatchEngine):
         """
         states = [name for name in ("qpos", "qvel") if name in record]
         before = {name: self.bound(name).copy() for name in states}
-        late = bool(self.adopted.late.any())
+        late = int(self.adopted.late.sum())
         if late:  # for the law: a batch keeps sensors of the copy that it stepped last only
             memory = self.bound("userdata")[:, self.adopted.memory :]
-            memory[:, 0], memory[:, 1 : 1 + self._heard_late.shape[1]] = 1.0, self._heard_late
+            memory[:, 0], memory[:, 1 : 1 + late] = 1.0, self._kept[:, :late]
         sensors = ["sensordata"] if late or {"signals", "sensordata"} & set(record) else []
         rows = self._advance(drive, start, stop, [*states, *sensors])
         found: dict[str, Any] = {name: shifted(before[name], rows[name]) for name in states}
         if sensors:
-            signals = self._signals(rows["sensordata"])
-            found |= {"signals": signals, "sensordata": rows["sensordata"]}
+            found |= {"signals": self._signals(rows["sensordata"])}
+            found |= {"sensordata": rows["sensordata"]}
+            self._kept = rows["sensordata"][:, -1, self.adopted.kept]
         return {name: found[name] for name in record}
 
+    @property
+    def _recorded_late(self) -> Array:
+        """Late signals (copies, n) as they are recorded at the next step: without a delay."""
+        late = int(self.adopted.late.sum())
+        return self._kept[:, self._kept.shape[1] - late :]
+
     def _signals(self, sensordata: Array) -> Array:
-        """Signals (copies, T, n_signals) as the law heard them."""
+        """Signals (copies, T, n_signals) as the law heard them, but for a delay."""
         signals, late = sensordata[..., self.adopted.signals], self.adopted.late
         if late.any():
-            now = signals[..., late]
-            signals[..., late] = shifted(self._heard_late, now)
-            self._heard_late = now[:, -1].copy()
+            signals[..., late] = shifted(self._recorded_late, signals[..., late])
         return signals

@@ -395,3 +395,32 @@ def test_the_twin_leaves_nothing_behind(body):
     assert twin.with_copies(2).alive.tolist() == [True, True]
     with pytest.raises(InvalidArgumentError, match="lenient"):
         twin.with_copies(2, lenient=True)
+
+
+def test_a_delay_with_late_sensors_is_the_same_in_chunks_and_snapshots():
+    rng = np.random.default_rng(0)
+    given = {"sensors": ["q1", "acc", "frc"], "channels": CHANNELS, "feedback_delay": 3}
+    whole = Reservoir(ARM, **given)
+    w_out = 0.02 * rng.normal(size=(whole.n_signals + 1, 3))
+    offset = np.cumsum(rng.normal(size=(300, 3)), axis=0) / 10
+    whole.set_readout(w_out)
+    run = whole.rollout(offset=offset)
+    parts = Reservoir(ARM, **given, w_out=w_out)
+    first = [part.signals for part in parts.stream(offset=offset[:200], chunk=7)]
+    snapshot = parts.snapshot()
+    parts.rollout(50)
+    parts.restore(snapshot)
+    rest = parts.rollout(offset=offset[200:]).signals
+    assert np.array_equal(np.concatenate([*first, rest]), run.signals)
+    # a delayed accelerometer is heard four steps late: three, and the one of its own
+    data = mujoco.MjData(model := mujoco.MjModel.from_xml_string(ARM))
+    seen = []
+    for k in range(299):
+        seen.append(np.r_[data.qpos[0], run.signals[k, 1:]])
+        y = seen[k - 3] @ w_out[:-1] + w_out[-1] if k >= 3 else np.zeros(3)
+        drive, data.ctrl[:] = y + offset[k], 0.0
+        for value, gains in zip(drive, CHANNELS.values(), strict=True):
+            for name, gain in gains.items():
+                data.ctrl[model.actuator(name).id] += gain * value
+        mujoco.mj_step(model, data)
+        assert np.abs(data.sensor("acc").data - run.signals[k + 1, 1:4]).max() < 1e-10

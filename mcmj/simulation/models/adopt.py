@@ -52,6 +52,9 @@ class AdoptedModel:
             and inputs.
         first: actuator of the first channel; outputs, then inputs.
         memory: in userdata, where late signals are put back from.
+        kept: (n,) in sensordata, what a batch must keep from chunk to chunk: the late signals as
+            the law reads them (delayed, if there is a delay), then, if those are others, as they
+            are recorded.
     """
 
     spec: mujoco.MjSpec
@@ -64,6 +67,7 @@ class AdoptedModel:
     input_names: tuple[str, ...]
     first: int
     memory: int
+    kept: npt.NDArray[np.int64]
 
 
 def read_spec(
@@ -184,6 +188,7 @@ def _with_channels(
         input_names=tuple(inputs),
         first=bare.nu,
         memory=bare.nuserdata,
+        kept=np.array([*slow, *(signals[late] if feedback_delay else ())], np.int64),
     )
 
 
