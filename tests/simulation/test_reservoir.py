@@ -424,3 +424,21 @@ def test_a_delay_with_late_sensors_is_the_same_in_chunks_and_snapshots():
                 data.ctrl[model.actuator(name).id] += gain * value
         mujoco.mj_step(model, data)
         assert np.abs(data.sensor("acc").data - run.signals[k + 1, 1:4]).max() < 1e-10
+
+
+def test_defaults_of_a_model_are_not_those_of_its_channels():
+    """Limits, dynamics and forces of a default are for the model's own actuators."""
+    default = (
+        '<default><general ctrllimited="true" ctrlrange="-.1 .1" dyntype="filter" dynprm="1" '
+        'forcelimited="true" forcerange="-1 1"/></default>'
+    )
+    xml = ARM.replace("<worldbody>", f"{default}<worldbody>")
+    reservoir = Reservoir(xml, sensors="q1", channels=["m1"])
+    offset = np.sin(0.01 * np.arange(500))[:, None]
+    run = reservoir.rollout(offset=offset, record=("qpos",))
+    data = mujoco.MjData(model := mujoco.MjModel.from_xml_string(xml))
+    for k in range(499):
+        data.ctrl[model.actuator("m1").id] = offset[k, 0]
+        mujoco.mj_step(model, data)
+    assert np.array_equal(run.qpos[-1], data.qpos)
+    assert np.abs(data.qpos[0]) > 0.1

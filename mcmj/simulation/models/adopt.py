@@ -193,12 +193,14 @@ def _with_channels(
 
 
 def _add_channel(spec: mujoco.MjSpec, name: str, width: int) -> None:
-    """An actuator without force, on what the first actuator moves."""
-    like = spec.actuators[0]
+    """An actuator without force, on what the first actuator moves; no default of the model's."""
+    like, no = spec.actuators[0], mujoco.mjtLimited.mjLIMITED_FALSE.value
     spec.add_actuator(
         name=name, trntype=like.trntype, target=like.target, refsite=like.refsite,
-        slidersite=like.slidersite, cranklength=like.cranklength,
-        gainprm=np.zeros(10), biastype=mujoco.mjtBias.mjBIAS_NONE, userdata=np.zeros(width),
+        slidersite=like.slidersite, cranklength=like.cranklength, inheritrange=0.0,
+        ctrllimited=no, forcelimited=no, actlimited=no, dyntype=mujoco.mjtDyn.mjDYN_NONE,
+        gaintype=mujoco.mjtGain.mjGAIN_FIXED, gainprm=np.zeros(10), delay=0.0, nsample=0,
+        biastype=mujoco.mjtBias.mjBIAS_NONE, biasprm=np.zeros(10), userdata=np.zeros(width),
     )  # fmt: skip
 
 
