@@ -10,7 +10,6 @@ gait then; what other ground does otherwise is left to change the rhythm.
 import numpy as np
 
 from mcmj.learning.lessons import Lesson, Teaching
-from mcmj.learning.regression import Fit
 from mcmj.learning.teaching import teach_lessons
 from mcmj.robots.leg_readouts import THIN, LegReadout, lift_of
 from mcmj.robots.quadruped import COMMANDS
@@ -28,7 +27,7 @@ NOISY = np.arange(COMMANDS) < len(LEGS)  # what the body hears, not the servos
 
 def teach_on_ground(
     walker: Walker, gait: LegReadout, target: Target, seed: int, *, duration: float = 100.0
-) -> tuple[LegReadout, Fit]:
+) -> LegReadout:
     """Fit the readouts of a gait while the robot walks under a teacher.
 
     Args:
@@ -52,4 +51,4 @@ def teach_on_ground(
     )  # fmt: skip
     walker.start(gait)
     fit = teach_lessons(walker, [lesson], TEACHING, seed)
-    return LegReadout(fit.w_out, walker.motion, gait.stride), fit
+    return LegReadout(fit.w_out, walker.motion, gait.stride, fit.train_nrmse)

@@ -15,7 +15,7 @@ import numpy as np
 
 from mcmj.core.body import Body
 from mcmj.core.readout import Readout, checked_readout
-from mcmj.learning.regression import Fit, Regression
+from mcmj.learning.regression import Regression
 from mcmj.learning.teaching import synchronise
 from mcmj.robots.quadruped import Stride
 from mcmj.robots.rescale import SIZE, rescaled_readout
@@ -37,11 +37,13 @@ class LegReadout:
         w_out: (L + 1, COMMANDS), readouts of what Stride.commands are; the first close the loop.
         start: (2, 2 n_free) positions [m] and velocities [m/s] of the free nodes' joints.
         stride: how the robot uses its legs.
+        nrmse: Fit.train_nrmse of what was fitted.
     """
 
     w_out: Array
     start: Array
     stride: Stride
+    nrmse: float = np.nan
 
 
 def lift_of(outputs: Array) -> Array:
@@ -60,7 +62,7 @@ def teach_lift(
     pace: float = 8.0,
     duration: float = 60.0,
     engine: str = "mujoco",
-) -> tuple[LegReadout, Fit]:
+) -> LegReadout:
     """Fit the readout of the lift while the body runs a gait by itself, in closed loop.
 
     Args:
@@ -92,4 +94,4 @@ def teach_lift(
     bias = np.eye(body.n_springs + 1)[:, -1:]
     moved = (state.positions - body.positions)[body.free].ravel()
     start = SIZE * np.stack([moved, pace * state.velocities[body.free].ravel()])
-    return LegReadout(stride.commands(swing, lift, bias), start, stride), fit
+    return LegReadout(stride.commands(swing, lift, bias), start, stride, fit.train_nrmse)

@@ -41,8 +41,8 @@ def body():
 @pytest.fixture(scope="module")
 def trot(body):
     w_out = readouts_of_model(load_model(body_path("gaits")))["trot"]
-    gait, fit = teach_lift(body, w_out, gait_target("trot"), duration=10.0, engine="twin")
-    assert fit.train_nrmse < 0.05
+    gait = teach_lift(body, w_out, gait_target("trot"), duration=10.0, engine="twin")
+    assert gait.nrmse < 0.05
     return gait
 
 
@@ -167,8 +167,8 @@ def test_a_teacher_leads_body_and_legs(body, trot):
 def test_a_body_taught_on_the_ground_keeps_the_targets_pace(body, trot):
     """Coupled, with the readouts of a body that never bore loads, the stride is off by 3 %."""
     walker = started(body, trot, coupling=0.4)
-    grounded, fit = teach_on_ground(walker, trot, gait_target("trot"), 0, duration=30.0)
-    assert fit.train_nrmse < 0.02
+    grounded = teach_on_ground(walker, trot, gait_target("trot"), 0, duration=30.0)
+    assert grounded.nrmse < 0.02
     wanted = gait_target("trot").period / walker.pace
     periods = []
     for gait in (trot, grounded):

@@ -8,7 +8,6 @@ import numpy as np
 
 from mcmj.core.body import Body
 from mcmj.experiments.walk.config import Config, get_body
-from mcmj.learning.regression import Fit
 from mcmj.robots import walk_metrics
 from mcmj.robots.ground_training import teach_on_ground
 from mcmj.robots.leg_readouts import LegReadout, teach_lift
@@ -31,14 +30,12 @@ class WalkLesson:
 
     Attributes:
         gaits: taught without ground.
-        fits: errors of all readouts on what they were fitted to, for metrics.json.
         grounded: taught with the legs' loads in the body, if a part needs them.
     """
 
     config: Config
     body: Body
     gaits: dict[str, LegReadout]
-    fits: Table
     grounded: dict[str, LegReadout] = field(default_factory=dict)
 
     def walker(self, **options: Any) -> Walker:
@@ -56,6 +53,16 @@ class WalkLesson:
         """Without and with the legs' loads in the body."""
         return {"uncoupled": 0.0, "coupled": self.config.coupling}
 
+    @property
+    def fits(self) -> Table:
+        """Errors of all readouts on what they were fitted to, for metrics.json."""
+        taught = {"lift_nrmse": self.gaits, "ground_nrmse": self.grounded}
+        return {
+            error: {name: gait.nrmse for name, gait in gaits.items()}
+            for error, gaits in taught.items()
+            if gaits
+        }
+
     def gait(self, name: str, coupling: float) -> LegReadout:
         """The readouts for a body with that coupling."""
         return self.grounded[name] if coupling else self.gaits[name]
@@ -65,20 +72,18 @@ def learn(config: Config) -> WalkLesson:
     """Take the config's body and gaits, teach it how far the legs are lifted, and the ground."""
     body, readouts = get_body(config)
 
-    def lift(name: str, on_steps: OnSteps) -> tuple[LegReadout, Fit]:
+    def lift(name: str, on_steps: OnSteps) -> LegReadout:
         given: dict[str, Any] = {"stride": STRIDES.get(name), "pace": config.pace}
         return teach_lift(body, readouts[name], gait_target(name), engine="twin", **given)
 
-    def ground(name: str, on_steps: OnSteps) -> tuple[LegReadout, Fit]:
+    def ground(name: str, on_steps: OnSteps) -> LegReadout:
         walker = lesson.walker(coupling=config.coupling)
         return teach_on_ground(walker, lesson.gaits[name], gait_target(name), config.seed)
 
-    taught = each(config.gaits, lift)
-    lesson = WalkLesson(config, body, *_told_apart(taught, "lift_nrmse"))
+    lesson = WalkLesson(config, body, each(config.gaits, lift))
     if not {"adapt", "recover"} & set(config.parts):
         return lesson
-    grounded, errors = _told_apart(each(config.gaits, ground), "ground_nrmse")
-    return replace(lesson, grounded=grounded, fits=lesson.fits | errors)
+    return replace(lesson, grounded=each(config.gaits, ground))
 
 
 def each(
@@ -88,14 +93,6 @@ def each(
 ) -> dict[K, V]:
     """Results of independent work by item."""
     return dict(zip(items, in_threads(work, items, on_steps), strict=True))
-
-
-def _told_apart(
-    taught: dict[str, tuple[LegReadout, Fit]], error: str
-) -> tuple[dict[str, LegReadout], Table]:
-    """Readouts by gait, and their errors for metrics.json."""
-    errors = {name: fit.train_nrmse for name, (_, fit) in taught.items()}
-    return {name: gait for name, (gait, _) in taught.items()}, {error: errors}
 
 
 def walk_table(lesson: WalkLesson, name: str, walk: Walk) -> Table:
