@@ -27,7 +27,7 @@ from mcmj.analysis.stability.tolerance import Trial, force_tolerance
 from mcmj.analysis.stability.variational import variational
 from mcmj.metrics.orbits import orbit_error
 from mcmj.targets.limit_cycles import limit_cycle
-from mcmj.utils.errors import DivergenceError, InvalidArgumentError, UnknownNameError
+from mcmj.utils.errors import DivergenceError, InvalidArgumentError, McmjError, UnknownNameError
 
 RAYLEIGH = """<mujoco><option timestep="{h}" integrator="RK4" gravity="0 0 0"/><worldbody><body>
 <joint name="x" type="slide" axis="1 0 0" stiffness="1" damping="0 0 .333333333333"/>
@@ -255,6 +255,15 @@ def test_what_is_left_out_can_be_said():
     assert loop.velocities == slice(7, 15)
     with pytest.raises(UnknownNameError, match="degree of freedom 'hip'; valid choices: a, b"):
         ReservoirLoop(reservoir, left_out=["hip"])
+
+
+def test_a_reservoir_that_blows_up_must_be_told_what_is_cyclic():
+    reservoir = mcmj.Reservoir(
+        RAYLEIGH.format(h=1e-3), sensors=["jointvel:x"], channels=["m"], w_out=[[1e5]]
+    )
+    with pytest.raises(McmjError, match="blew up when it was stirred"):
+        ReservoirLoop(reservoir)
+    assert ReservoirLoop(reservoir, left_out=()).size == 2
 
 
 # --- planar bodies ---------------------------------------------------------------------------

@@ -35,6 +35,7 @@ class ReservoirLoop:
     Raises:
         InvalidArgumentError: delayed feedback, late sensors, the leapfrog or substeps, which make
             the state more than positions, velocities and activations.
+        McmjError: it blew up where `left_out` was to be found.
         UnknownNameError: no such degree of freedom.
     """
 
