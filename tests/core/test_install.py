@@ -4,6 +4,7 @@ import mujoco
 import numpy as np
 import pytest
 import twins
+from models import CHAIN, CHAIN_PARTS
 
 import mcmj
 from mcmj import Simulation, to_mjcf
@@ -280,3 +281,18 @@ def test_a_foreign_callback_in_mid_stream_is_refused(no_callbacks, body, w_bias)
     mujoco.set_mjcb_act_bias(lambda model, data, actuator: 0.0)
     with pytest.raises(McmjError, match="another mjcb_act_bias is installed"):
         next(stream)
+
+
+def test_any_model_installs_callbacks_that_were_taken_out(no_callbacks):
+    w_out = np.random.default_rng(0).normal(size=(5, 2)) / 50
+    runs = []
+    for taken_out in (False, True):
+        reservoir = mcmj.Reservoir(CHAIN, **CHAIN_PARTS, w_out=w_out)
+        reservoir.set_state(qvel=[1.0, -2.0])
+        parts = []
+        for part in reservoir.stream(300, chunk=100):
+            parts.append(part.signals)
+            if taken_out:
+                install.uninstall()
+        runs.append(np.concatenate(parts))
+    assert np.array_equal(*runs)
