@@ -14,20 +14,17 @@ from PIL import Image
 
 from mcmj.mjcf.appearance import node_kinds
 from mcmj.pictures.film import Film
+from mcmj.pictures.film_axes import SMALL, Plane, Traces
 from mcmj.utils.colours import (
-    BLACK,
     CHANGE_COLOUR,
-    OUTPUT_COLOURS,
     SHORTENED_COLOUR,
     STRETCHED_COLOUR,
-    TARGET_COLOUR,
 )
 
 Picture = npt.NDArray[np.uint8]
 
 DPI = 100  # only ratios of font sizes to pixels depend on it
-TRAIL = 3.0  # seconds of outputs drawn strongly in the portrait
-SMALL, LARGE = 8.5, 10.5  # points
+LARGE = 10.5  # points
 
 
 class FilmFigure:
@@ -60,9 +57,15 @@ class FilmFigure:
             height_ratios=(1.9, 1.0),
         )  # fmt: skip
         has_plane = film.outputs.shape[1] >= 2
-        self._plane = _Plane(self._figure.add_subplot(grid[0]), film) if has_plane else None
+        self._plane = (
+            Plane(self._figure.add_subplot(grid[0]), film.times, film.outputs, film.orbit)
+            if has_plane
+            else None
+        )
         rows = grid[1] if has_plane else grid[:]
-        self._traces = _Traces(self._figure.add_subplot(rows), film)
+        self._traces = Traces(
+            self._figure.add_subplot(rows), film.times, film.outputs, film.windows
+        )
         self._canvas.draw()
         self._ground = self._canvas.copy_from_bbox(self._figure.bbox)
         self._no_label = self._canvas.copy_from_bbox(words.bbox)
@@ -92,74 +95,6 @@ class FilmFigure:
             self._canvas.restore_region(self._no_label)
             self._label.set_text(label)
             self._figure.draw_artist(self._label)
-
-
-class _Plane:
-    """The first two outputs against each other."""
-
-    def __init__(self, axes: Axes, film: Film) -> None:
-        self._axes, self._times, self._outputs = axes, film.times, film.outputs[:, :2]
-        shown = self._outputs
-        if film.orbit is not None:
-            orbit = np.vstack([film.orbit, film.orbit[:1]])[:, :2]
-            axes.plot(*orbit.T, color=TARGET_COLOUR, lw=3, alpha=0.55, label="target")
-            shown = np.vstack([shown, orbit])
-        (self._past,) = axes.plot([], [], color="0.8", lw=0.7, animated=True)
-        (self._trail,) = axes.plot([], [], color=BLACK, lw=1.4, animated=True, label="output")
-        (self._now,) = axes.plot([], [], "o", color=BLACK, ms=6, animated=True)
-        axes.update_datalim(shown)
-        axes.margins(0.06)
-        axes.autoscale_view()
-        axes.set_aspect("equal", adjustable="datalim")
-        _label_axes(axes, "$x_1$", "$x_2$")
-
-    def extend(self, new: slice) -> None:
-        """Draw samples for good."""
-        self._past.set_data(*self._outputs[new].T)
-        self._axes.draw_artist(self._past)
-
-    def draw_trail(self, index: int) -> None:
-        """Draw the last seconds before a sample."""
-        first = int(np.searchsorted(self._times, self._times[index] - TRAIL))
-        self._trail.set_data(*self._outputs[first : index + 1].T)
-        self._now.set_data(self._outputs[index : index + 1].T)
-        for line in (self._trail, self._now):
-            self._axes.draw_artist(line)
-
-
-class _Traces:
-    """All outputs over time."""
-
-    def __init__(self, axes: Axes, film: Film) -> None:
-        self._axes, self._times, self._outputs = axes, film.times, film.outputs
-        for window in film.windows:
-            axes.axvspan(window.start, window.end, color=CHANGE_COLOUR, alpha=0.15, lw=0)
-        self._lines = [
-            axes.plot([], [], color=OUTPUT_COLOURS[c % len(OUTPUT_COLOURS)], lw=1.1, animated=True,
-                      label=f"$x_{c + 1}$")[0]
-            for c in range(film.outputs.shape[1])
-        ]  # fmt: skip
-        reach = 1.1 * float(np.abs(film.outputs).max(initial=0.0)) or 1.0
-        axes.set(xlim=(film.times[0], film.times[-1]), ylim=(-reach, reach))
-        _label_axes(axes, "time [s]", "outputs")
-
-    def extend(self, new: slice) -> None:
-        """Draw samples for good."""
-        for line, values in zip(self._lines, self._outputs.T, strict=True):
-            line.set_data(self._times[new], values[new])
-            self._axes.draw_artist(line)
-
-
-def _label_axes(axes: Axes, x: str, y: str) -> None:
-    axes.set_xlabel(x, fontsize=SMALL, labelpad=1)
-    axes.set_ylabel(y, fontsize=SMALL, labelpad=1)
-    axes.tick_params(labelsize=SMALL)
-    axes.spines[["right", "top"]].set_visible(False)
-    handles, labels = axes.get_legend_handles_labels()
-    axes.legend(
-        handles, labels, loc="lower right", ncols=len(labels),
-        bbox_to_anchor=(1.0, 0.98), borderpad=0.0, fontsize=SMALL, frameon=False,
-    )  # fmt: skip
 
 
 def _draw_legends(axes: Axes, film: Film) -> None:

@@ -1,0 +1,39 @@
+"""Models of dm_control's suite, as MjSpec; needs the extra "control"."""
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import mujoco
+
+from mcmj.utils.extras import extra
+
+with extra("control", "the models of dm_control's suite need dm_control"):
+    from dm_control.suite import cheetah, common, fish, quadruped, swimmer
+
+LINKS = 15  # of the swimmer
+FLOOR = 20  # half width of the quadruped's ground [m]
+
+_MODELS: dict[str, Callable[[], tuple[Any, Mapping[str, Any]]]] = {
+    "swimmer": lambda: swimmer.get_model_and_assets(LINKS),
+    "fish": fish.get_model_and_assets,
+    "cheetah": cheetah.get_model_and_assets,
+    "quadruped": lambda: (quadruped.make_model(floor_size=FLOOR), common.ASSETS),
+}
+
+
+def suite_model(name: str) -> mujoco.MjSpec:
+    """A model of the suite as it is, "swimmer", "fish", "cheetah" or "quadruped"."""
+    xml, assets = _MODELS[name]()
+    text = xml.decode() if isinstance(xml, bytes) else xml
+    spec = mujoco.MjSpec.from_string(text, include=dict(assets))
+    _make_defaults_plain(spec.default.actuator)
+    return spec
+
+
+def _make_defaults_plain(default: Any) -> None:
+    """What is added to a model takes its defaults: a channel has no limits and no dynamics.
+
+    Actuators that are there already have taken theirs.
+    """
+    default.ctrllimited = default.forcelimited = default.actlimited = False
+    default.dyntype = mujoco.mjtDyn.mjDYN_NONE
