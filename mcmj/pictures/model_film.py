@@ -20,7 +20,7 @@ from mcmj.utils.validation import Array, as_array, require_number
 WIDTH, HEIGHT, PANEL = 640, 480, 384  # pixels: the model's picture; width of the axes beside it
 DPI = 100
 FPS = 25
-REACH = 2.2  # distance of the camera, over the size of what moves
+REACH = 2.8  # distance of the camera, over the size of what moves
 
 
 @dataclass(frozen=True)

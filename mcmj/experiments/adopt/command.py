@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 from rich.console import Console
+from rich.table import Table
 
 from mcmj.experiments.adopt.config import Config, total_readouts
 from mcmj.experiments.adopt.figure import figures
@@ -37,34 +38,34 @@ def write_films(result: Result, folder: Path) -> None:
 
 
 def show(result: Result, console: Console) -> None:
-    """The table of all models."""
+    """All models: what was learned, then what they are worth."""
     config = result.config
-    title = (
-        f"orbit error below {100 * config.threshold:g} % in the last {config.window:g} s, of "
-        f"{config.seeds} readouts"
-    )
-    table = table_of(
-        title, "model", "target", "period", "signals", "free", "from rest", "held", "kicked",
-        "median error", "worst", "recovery", "largest control", "memory", "nonlinear", "kernel",
-        words=2,
-    )  # fmt: skip
+    percent, last = 100 * config.threshold, f"the last {config.window:g} s"
+    title = f"of {config.seeds} readouts, those with an orbit error below {percent:g} % in {last}"
+    columns = ("model", "free", "median", "worst", "from rest", "held", "kicked", "recovery")
+    table = table_of(title, *columns)
     for name, one in result.adopted.items():
         free = 100 * one.errors("free")
-        successes = [str(int((one.errors(run) < config.threshold).sum())) for run in RUNS]
-        table.add_row(
-            Path(name).stem, one.target.name, f"{one.target.period:.2f} s",
-            str(one.reservoir.n_signals), *successes, f"{np.median(free):.2f} %",
-            f"{free.max():.2f} %", f"{np.median(one.errors('recovery')):.1f} s",
-            f"{one.largest_control:.2f}", *_worth_cells(one),
-        )  # fmt: skip
+        counts = [str(int((one.errors(run) < config.threshold).sum())) for run in RUNS]
+        errors = [f"{np.median(free):.2f} %", f"{free.max():.2f} %"]
+        recovery = f"{np.median(one.errors('recovery')):.1f} s"
+        table.add_row(Path(name).stem, counts[0], *errors, *counts[1:], recovery)
     console.print(table)
+    console.print(_models_table(result))
 
 
-def _worth_cells(one: Adopted) -> list[str]:
-    worth = one.worth
-    if worth is None:
-        return [""] * 3
-    return [f"{worth.memory:.1f}", f"{worth.nonlinear:.1f}", str(worth.kernel_rank)]
+def _models_table(result: Result) -> Table:
+    columns = ("period", "signals", "rank", "kernel", "memory", "nonlinear", "control")
+    table = table_of("the models as reservoirs", "model", "target", *columns, words=2)
+    for name, one in result.adopted.items():
+        worth = [""] * 4
+        if one.worth is not None:
+            w = one.worth
+            worth = [str(w.rank), str(w.kernel_rank), f"{w.memory:.1f}", f"{w.nonlinear:.1f}"]
+        period, signals = f"{one.target.period:.2f} s", str(one.reservoir.n_signals)
+        control = f"{one.largest_control:.2f}"
+        table.add_row(Path(name).stem, one.target.name, period, signals, *worth, control)
+    return table
 
 
 def _that_moved(result: Result) -> dict[str, Adopted]:

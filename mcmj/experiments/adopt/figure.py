@@ -5,7 +5,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from mcmj.experiments.adopt.result import RUNS, Adopted, Result
-from mcmj.pictures.plotting import draw_phase_plane, new_figure
+from mcmj.pictures.plotting import count_in_whole_numbers, draw_phase_plane, new_figure
 from mcmj.utils.colours import BLACK, BLUE, GREEN, ORANGE, RED
 
 STYLES = {
@@ -34,7 +34,9 @@ def adopt_figure(result: Result) -> Figure:
         for inner in row[1:]:
             inner.set_ylabel("")
     handles, labels = axes[1, 0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=5, frameon=False)
+    figure.legend(
+        handles, labels, loc="outside lower center", ncols=5 if count > 2 else 2, frameon=False
+    )
     return figure
 
 
@@ -53,4 +55,4 @@ def _draw_errors(axes: Axes, one: Adopted, threshold: float) -> None:
     axes.axhline(100 * threshold, color=RED, ls=":", lw=1, label=f"{100 * threshold:g} %")
     axes.set(xlabel="seed of the teacher noise", ylabel="orbit error [%]")
     axes.set_ylim(0.1, 120 * WORST)
-    axes.xaxis.get_major_locator().set_params(integer=True)
+    count_in_whole_numbers(axes)

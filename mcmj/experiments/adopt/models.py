@@ -116,8 +116,9 @@ def build(adoption: Adoption, target: Target, radius: float, seed: int) -> Built
     Raises:
         BodyFileError, UnknownNameError: no such model, sensor or actuator.
     """
-    model, options = adoption.load(), {"timestep": adoption.timestep}
-    found = Reservoir(model, sensors=adoption.sensors, channels=adoption.channels, **options)
+    model = adoption.load()
+    options: dict[str, Any] = {"sensors": adoption.sensors, "timestep": adoption.timestep}
+    found = Reservoir(model, channels=adoption.channels, **options)
     actuators, draw = found.channel_names, stream(seed, "channel_gains")
     size = adoption.drive / radius
     gains = draw.uniform(-size, size, (target.n_outputs, len(actuators)))
@@ -129,5 +130,5 @@ def build(adoption: Adoption, target: Target, radius: float, seed: int) -> Built
         actuator = found.model.actuator(name)
         if actuator.ctrllimited[0]:
             limits[:, place] = actuator.ctrlrange
-    reservoir = Reservoir(model, sensors=adoption.sensors, channels=channels, **options)
+    reservoir = Reservoir(model, channels=channels, **options)
     return Built(reservoir, gains.T, limits)

@@ -117,7 +117,7 @@ class _Judge:
         return round(seconds / self._reservoir.timestep)
 
     def _run(self, seconds: float) -> Array:
-        return self._reservoir.rollout(self._steps(seconds), record=("outputs",)).outputs
+        return self._reservoir.rollout(self._steps(seconds), record=("outputs",)).get("outputs")
 
     def _error(self, outputs: Array) -> float:
         """Of the last part."""
@@ -129,7 +129,7 @@ class _Judge:
             self._steps(SHOWN * self._target.period), record=("qpos", "qvel", "outputs")
         )
         qpos, qvel = found.get("qpos"), found.get("qvel")
-        return Motion(found.times - found.times[0], qpos, found.outputs), qvel
+        return Motion(found.times - found.times[0], qpos, found.get("outputs")), qvel
 
     def _after_freeze(self, last: Array) -> Array:
         """Outputs after the last of them was held for a period."""

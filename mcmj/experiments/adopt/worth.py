@@ -61,7 +61,7 @@ def _ends_of_symbols(parts: Iterator[Trajectory], hold: int) -> Iterator[Array]:
     """The rows of signals at the last step of each symbol, chunk by chunk."""
     done = 0
     for part in parts:
-        signals = part.signals
+        signals = part.get("lengths")
         first = (hold - 1 - done) % hold
         yield signals[first::hold].copy()
         done += len(signals)
