@@ -28,7 +28,7 @@ def built(name, integrator=None):
     if integrator is not None:
         load = adoption.load
         adoption = replace(adoption, load=lambda: with_integrator(load(), integrator))
-    return build(adoption, target, rms_radius(target.orbit(512)), 0), target
+    return build(adoption, target, rms_radius(target.orbit(512))), target
 
 
 def with_integrator(model, integrator):

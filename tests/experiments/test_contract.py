@@ -97,7 +97,9 @@ def test_the_registry_is_complete():
     for entry in entries().values():
         assert entry.group in GROUPS
         assert 10 < len(entry.line) < 60
-    with pytest.raises(UnknownNameError, match="unknown experiment 'waltz'; valid choices: bench"):
+    with pytest.raises(
+        UnknownNameError, match="unknown experiment 'waltz'; valid choices: adopt, bench"
+    ):
         experiment_named("waltz")
 
 

@@ -27,10 +27,10 @@ class Config:
         pace: the target runs so many times faster; default: the model's, 1 for a file.
         drive: an actuator's gains are uniform in +-drive over the target's RMS radius;
             default: the model's.
+        gain_seed: of the gains; default: the model's, 0 for a file.
         timestep: [s]; default: the model's.
         seed: of the first noise; the others follow.
         seeds: number of readouts taught, each under noise of its own.
-        gain_seed: of the gains.
         noise: standard deviation of the teacher noise, over the target's RMS radius.
         ridge_per_row: of the regression.
         periods: of the target under the teacher; the first three are washout.
@@ -49,14 +49,14 @@ class Config:
     task: str = ""
     pace: float | None = None
     drive: float | None = None
+    gain_seed: int | None = None
     timestep: float | None = None
     seed: int = 0
     seeds: int = 10
-    gain_seed: int = 0
     noise: float = 0.15
     ridge_per_row: float = 1e-8
     periods: float = 30.0
-    rounds: int = 12
+    rounds: int = 6
     free_run: float = 60.0
     after: float = 40.0
     window: float = 20.0
@@ -65,8 +65,9 @@ class Config:
     streams: int = 100
 
     def __post_init__(self) -> None:
-        for name in ("seed", "gain_seed"):
-            require_seed(name, getattr(self, name))
+        require_seed("seed", self.seed)
+        if self.gain_seed is not None:
+            require_seed("gain_seed", self.gain_seed)
         require_count("seeds", self.seeds, 1)
         for name in ("rounds", "symbols", "streams"):
             require_count(name, getattr(self, name), 0)
@@ -93,7 +94,7 @@ class Config:
         """
         changes = {
             field: getattr(self, field)
-            for field in ("sensors", "channels", "task", "pace", "drive", "timestep")
+            for field in ("sensors", "channels", "task", "pace", "drive", "gain_seed", "timestep")
             if getattr(self, field) not in ((), "", None)
         }
         if name in ADOPTIONS:
@@ -120,7 +121,7 @@ class Config:
         """For a target of that period [s]."""
         return Practice(
             rounds=self.rounds, round_duration=10 * period, round_weight=1e-3,
-            trial=20 * period, trial_window=5 * period,
+            trial=20 * period, trial_window=5 * period, good_enough=0.03,
         )  # fmt: skip
 
 

@@ -41,7 +41,7 @@ def adopt(config: Config, name: str, on_steps: OnSteps = lambda steps: None) -> 
     """One model; see `run`."""
     target = config.target(name)
     radius = orbits.rms_radius(target.orbit(orbits.ORBIT_POINTS))
-    built = build(config.adoption(name), target, radius, config.gain_seed)
+    built = build(config.adoption(name), target, radius)
     reservoir, trials, motion, w_out = built.reservoir, [], None, None
     for seed in range(config.seed, config.seed + config.seeds):
         judge = _Judge(config, reservoir, target, seed)
