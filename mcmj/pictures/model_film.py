@@ -1,6 +1,7 @@
 """MP4 of any MuJoCo model at work, as MuJoCo's renderer shows it, beside its phase portrait."""
 
 from collections.abc import Iterator
+from copy import copy
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -20,7 +21,8 @@ from mcmj.utils.validation import Array, as_array, require_number
 WIDTH, HEIGHT, PANEL = 640, 480, 384  # pixels: the model's picture; width of the axes beside it
 DPI = 100
 FPS = 25
-REACH = 2.8  # distance of the camera, over the size of what moves
+SHADOW = 1024  # pixels of the map
+REACH = 2.6  # distance of the camera, over the size of what moves
 
 
 @dataclass(frozen=True)
@@ -78,13 +80,16 @@ def write_model_film(film: ModelFilm, path: str | Path) -> None:
 
 def model_frames(film: ModelFilm) -> Iterator[Picture]:
     """Frames (480, 1024, 3): the model, beside its outputs."""
-    panel = _Panel(film)
-    camera, data = _camera(film), mujoco.MjData(film.model)
-    with new_renderer(film.model, WIDTH, HEIGHT) as renderer:
-        for row in film.rows:
+    model, panel = copy(film.model), _Panel(film)  # a renderer changes its model
+    model.vis.quality.shadowsize, model.vis.quality.offsamples = SHADOW, 0
+    camera, data = mujoco.MjvCamera(), mujoco.MjData(model)
+    camera.type, camera.azimuth, camera.elevation = mujoco.mjtCamera.mjCAMERA_FREE, 120.0, -20.0
+    looked, camera.distance = _path(film)
+    with new_renderer(model, WIDTH, HEIGHT) as renderer:
+        for row, place in zip(film.rows, looked, strict=True):
             data.qpos[:] = film.qpos[row]
-            mujoco.mj_fwdPosition(film.model, data)
-            camera.lookat[:2] = _centre(film.model, data)[:2]
+            mujoco.mj_fwdPosition(model, data)
+            camera.lookat[:] = place
             renderer.update_scene(data, camera)
             yield np.hstack([renderer.render(), panel.draw(int(row))])
 
@@ -122,16 +127,22 @@ def _centre(model: mujoco.MjModel, data: mujoco.MjData) -> Array:
     return found
 
 
-def _camera(film: ModelFilm) -> mujoco.MjvCamera:
-    """From the side and a little above, so far that what has mass fills the picture."""
-    data = mujoco.MjData(film.model)
-    data.qpos[:] = film.qpos[0]
-    mujoco.mj_fwdPosition(film.model, data)
-    heavy = film.model.body_mass[film.model.geom_bodyid] > 0
-    centre, reach = _centre(film.model, data), film.model.geom_rbound[heavy]
-    size = (np.linalg.norm(data.geom_xpos[heavy] - centre, axis=1) + reach).max()
-    camera = mujoco.MjvCamera()
-    camera.type = mujoco.mjtCamera.mjCAMERA_FREE
-    camera.lookat[:], camera.distance = centre, REACH * size
-    camera.azimuth, camera.elevation = 120.0, -20.0
-    return camera
+def _path(film: ModelFilm) -> tuple[Array, float]:
+    """Where the camera looks in every frame (F, 3), and its distance [m].
+
+    It goes straight along with the centre of mass, so far away that all that has mass is seen.
+    """
+    model, data = film.model, mujoco.MjData(film.model)
+    heavy = model.body_mass[model.geom_bodyid] > 0
+    centres, places = [], []
+    for row in film.rows:
+        data.qpos[:] = film.qpos[row]
+        mujoco.mj_fwdPosition(model, data)
+        centres.append(_centre(model, data))
+        places.append(data.geom_xpos[heavy].copy())
+    steps = np.arange(len(centres))
+    looked = np.column_stack(
+        [np.polyval(np.polyfit(steps, c, 1), steps) for c in np.transpose(centres)]
+    )
+    away = np.linalg.norm(np.array(places) - looked[:, None], axis=2) + model.geom_rbound[heavy]
+    return looked, REACH * float(away.max())

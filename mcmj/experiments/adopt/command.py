@@ -1,5 +1,6 @@
 """The command: adopt."""
 
+import warnings
 from pathlib import Path
 
 import numpy as np
@@ -12,8 +13,9 @@ from mcmj.experiments.adopt.result import RUNS, Adopted, Result
 from mcmj.experiments.adopt.run import run
 from mcmj.experiments.base import Experiment, counting, table_of
 from mcmj.pictures.model_film import ModelFilm, write_model_film
+from mcmj.pictures.opengl import RenderingUnavailableError
 from mcmj.utils import files
-from mcmj.utils.errors import McmjError
+from mcmj.utils.errors import McmjError, McmjWarning
 
 
 def write(result: Result, folder: Path) -> None:
@@ -34,7 +36,11 @@ def write_films(result: Result, folder: Path) -> None:
             one.reservoir.model, one.motion.times, one.motion.qpos, one.motion.outputs,
             one.target.orbit(1000),
         )  # fmt: skip
-        write_model_film(film, folder / f"{Path(name).stem}.mp4")
+        try:
+            write_model_film(film, folder / f"{Path(name).stem}.mp4")
+        except RenderingUnavailableError as error:
+            warnings.warn(f"no film: {error}", McmjWarning, stacklevel=2)
+            return
 
 
 def show(result: Result, console: Console) -> None:
@@ -56,7 +62,7 @@ def show(result: Result, console: Console) -> None:
 
 def _models_table(result: Result) -> Table:
     columns = ("period", "signals", "rank", "kernel", "memory", "nonlinear", "control")
-    table = table_of("the models as reservoirs", "model", "target", *columns, words=2)
+    table = table_of("the models as reservoirs", "model", *columns)
     for name, one in result.adopted.items():
         worth = [""] * 4
         if one.worth is not None:
@@ -64,7 +70,7 @@ def _models_table(result: Result) -> Table:
             worth = [str(w.rank), str(w.kernel_rank), f"{w.memory:.1f}", f"{w.nonlinear:.1f}"]
         period, signals = f"{one.target.period:.2f} s", str(one.reservoir.n_signals)
         control = f"{one.largest_control:.2f}"
-        table.add_row(Path(name).stem, one.target.name, period, signals, *worth, control)
+        table.add_row(Path(name).stem, period, signals, *worth, control)
     return table
 
 

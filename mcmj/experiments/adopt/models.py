@@ -32,7 +32,6 @@ class Adoption:
         drive: an actuator's gains are uniform in +-drive over the target's RMS radius.
         gain_seed: of the gains: of ten draws, the one that learned best.
         timestep: [s]; None: the model's.
-        where: what it stands, lies or swims in.
     """
 
     load: Callable[[], Any]
@@ -43,7 +42,6 @@ class Adoption:
     drive: float = 0.2
     gain_seed: int = 0
     timestep: float | None = None
-    where: str = ""
 
 
 def _of_suite(name: str) -> Any:
@@ -59,38 +57,34 @@ LEGS = ("yaw*", "pitch*", "knee*", "ankle*")
 ADOPTIONS: dict[str, Adoption] = {
     "swimmer": Adoption(
         partial(_of_suite, "swimmer"), ("jointpos:joint_*", "jointvel:joint_*"), drive=0.6,
-        gain_seed=1,
-        where="in a fluid",
+        gain_seed=1,  # in a fluid
     ),
     "fish": Adoption(
         partial(_of_suite, "fish"), (*JOINTS, "velocimeter", "gyro"), pace=8.0, drive=0.6,
-        gain_seed=4,
-        where="in a fluid",
+        gain_seed=4,  # in a fluid
     ),
     "cheetah": Adoption(
         partial(_of_suite, "cheetah"),
         ("jointpos:[bf]*", "jointpos:rootz", "jointpos:rooty", "jointvel:*"),
-        task="quadratic", pace=10.0, drive=0.3, gain_seed=6, timestep=0.002,
-        where="stands on the ground",
+        task="quadratic", pace=10.0, drive=0.3, gain_seed=6, timestep=0.002,  # stands on the ground
     ),
     "quadruped": Adoption(
         partial(_of_suite, "quadruped"),
         tuple(f"{kind}:{leg}" for kind in ("jointpos", "jointvel") for leg in LEGS),
-        pace=2.0, drive=0.3, gain_seed=9, where="stands on the ground",
+        pace=2.0, drive=0.3, gain_seed=9,  # stands on the ground
     ),
     "tensegrity": Adoption(
-        partial(model_path, "tensegrity"), CABLES, pace=10.0, gain_seed=3,
-        where="lies on the ground",
+        partial(model_path, "tensegrity"), CABLES, pace=10.0, gain_seed=3,  # lies on the ground
     ),
     "soft_arm": Adoption(
-        partial(model_path, "soft_arm"), (*JOINTS, *CABLES), pace=5.0, where="hangs"
+        partial(model_path, "soft_arm"), (*JOINTS, *CABLES), pace=5.0,  # hangs
     ),
 }  # fmt: skip
 
 
 def own_adoption(path: str, sensors: tuple[str, ...]) -> Adoption:
     """A model of one's own, from an MJCF file."""
-    return Adoption(partial(Path, path), sensors, where="")
+    return Adoption(partial(Path, path), sensors)
 
 
 @dataclass(frozen=True)
