@@ -86,8 +86,8 @@ class _Judge:
             outputs[-self._steps(config.window) :], reservoir.timestep, target
         )
         self.motion, speeds = self._keep_motion()
-        before = reservoir.snapshot()
-        after_freeze = or_lost(lambda: self._error(self._after_freeze(outputs[-1])), np.inf)
+        before, held = reservoir.snapshot(), self.motion.outputs[-1]
+        after_freeze = or_lost(lambda: self._error(self._after_freeze(held)), np.inf)
         reservoir.restore(before)
         kicked = or_lost(lambda: self._after_kick(speeds), None)
         reservoir.reset()
