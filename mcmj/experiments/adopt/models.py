@@ -30,7 +30,7 @@ class Adoption:
         task: target, see mcmj.targets.named.
         pace: the target runs so many times faster.
         drive: an actuator's gains are uniform in +-drive over the target's RMS radius.
-        gain_seed: of the gains: of ten draws, the one that learned best.
+        gain_seed: of the gains: a good one of ten draws, found with the first noise.
         timestep: [s]; None: the model's.
     """
 
