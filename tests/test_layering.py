@@ -54,6 +54,7 @@ MUJOCO = {
     "core.callbacks.install",
     "core.callbacks.library",
     "core.callbacks.offsets",
+    "experiments.adopt.suite_models",
     "experiments.benchmark.full_scene",
     "experiments.benchmark.run",
     "experiments.limit_cycle.loop_cost",  # times bare mj_step
@@ -87,7 +88,7 @@ EXTRAS = {
     "xarray": {"simulation.trajectory_files.zarr"},
     "h5py": {"simulation.trajectory_files.openprc"},
     "gymnasium": {"learning.environments.gymnasium_env"},
-    "dm_control": {"learning.environments.environment"},
+    "dm_control": {"experiments.adopt.suite_models", "learning.environments.environment"},
     "dm_env": {"learning.environments.environment"},
 }
 

@@ -60,7 +60,7 @@ def test_all_of_mcmj_is_in_the_wheel_and_nothing_else(wheel):
     info = f"{wheel.name.split('-py3')[0]}.dist-info"
     assert {name.split("/")[0] for name in names} == {"mcmj", info}
     modules = {str(path.relative_to(ROOT)) for path in (ROOT / "mcmj").rglob("*.py")}
-    bodies = {f"mcmj/bodies/{path.name}" for path in (ROOT / "bodies").glob("*.xml")}
+    bodies = {f"mcmj/{path.relative_to(ROOT)}" for path in (ROOT / "bodies").rglob("*.xml")}
     assert {name for name in names if name.startswith("mcmj/")} == {
         "mcmj/py.typed", *modules, *bodies
     }  # fmt: skip

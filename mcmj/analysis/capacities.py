@@ -46,6 +46,8 @@ class Probe:
         stream_symbols: their length; the last `shared` are alike for the generalisation rank.
         shared: number of those.
         resolution: of the readout that the ranks assume, in units of the signals ([m] of lengths).
+        relative: every signal is divided by its own standard deviation first, for signals of
+            different units; those that do not move are left out.
         threads: results do not depend on them.
     """
 
@@ -60,6 +62,7 @@ class Probe:
     stream_symbols: int = 40
     shared: int = 10
     resolution: float = 1e-4
+    relative: bool = False
     threads: int = 1
 
     def __post_init__(self) -> None:
@@ -126,12 +129,13 @@ def capacities_of(reservoir: Reservoir, probe: Probe | None = None) -> Worth:
     u = stream(p.seed, "probe_inputs").uniform(-1.0, 1.0, (p.washout + p.symbols, 1))
     reservoir.reset()
     states = shown(reservoir, u)[p.washout :]
-    capacities = processing_capacity(states, u[p.washout :, 0], p.max_delays)
+    scale = _spread(states) if p.relative else np.ones(reservoir.n_signals)
+    capacities = processing_capacity(states / scale, u[p.washout :, 0], p.max_delays)
     streams = stream(p.seed, "probe_inputs").uniform(-1.0, 1.0, (p.streams, p.stream_symbols, 1))
     alike = streams.copy()
     alike[:, p.stream_symbols - p.shared :] = streams[:1, -p.shared :]
     ends = [
-        shown(reservoir.with_copies(p.streams, p.threads), symbols)[:, -1]
+        shown(reservoir.with_copies(p.streams, p.threads), symbols)[:, -1] / scale
         for symbols in (streams, alike)
     ]
     return Worth(
@@ -139,6 +143,12 @@ def capacities_of(reservoir: Reservoir, probe: Probe | None = None) -> Worth:
         kernel_rank(ends[0], p.resolution),
         generalisation_rank(ends[1], p.resolution),
     )
+
+
+def _spread(states: Array) -> Array:
+    """Standard deviations (n_signals,) of states (M, n_signals); infinite without motion."""
+    spread = states.std(axis=0)
+    return np.where(spread > 1e-9 * spread.max(), spread, np.inf)
 
 
 def driven_channel(reservoir: Reservoir, name: str | None) -> tuple[Driven, int]:

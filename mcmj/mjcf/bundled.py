@@ -45,6 +45,23 @@ def body_path(name: str) -> Path:
     raise UnknownNameError("body", name, [*body_names(), "a path to an .xml file"])
 
 
+def model_names() -> list[str]:
+    """Names of the MuJoCo models that come with mcmj, for `mcmj.Reservoir`; no planar bodies."""
+    return sorted(path.stem for folder in _FOLDERS for path in folder.glob("models/*.xml"))
+
+
+def model_path(name: str) -> Path:
+    """Path of a model by its name.
+
+    Raises:
+        UnknownNameError: no such model.
+    """
+    for folder in _FOLDERS:
+        if name and (folder / "models" / f"{name}.xml").is_file():
+            return folder / "models" / f"{name}.xml"
+    raise UnknownNameError("model", name, model_names())
+
+
 @dataclass(frozen=True)
 class StoredBody:
     """All that a body file holds, read at one time.

@@ -51,6 +51,21 @@ class Target:
         """y* (T, n_outputs) at times (T,) [s]."""
         return self.curve(np.mod(np.asarray(times, dtype=np.float64), self.period))
 
+    def faster(self, pace: float) -> "Target":
+        """The same orbit, run through `pace` times as fast: y*(pace t).
+
+        Raises:
+            InvalidArgumentError: a pace that is not positive.
+        """
+        require_number("pace", pace, 0.0, open_low=True)
+        curve, rhs = self.curve, self.rhs
+        return Target(
+            self.name,
+            self.period / pace,
+            lambda times: curve(pace * np.asarray(times, dtype=np.float64)),
+            None if rhs is None else lambda t, x: pace * np.asarray(rhs(pace * t, x)),
+        )
+
     def orbit(self, points: int) -> Array:
         """One period as a closed polygon (points, n_outputs), equally spaced in time."""
         return self.sample(np.arange(points) * (self.period / points))

@@ -31,6 +31,8 @@ PURPOSES = (
     "input_search",
     "walk_moments",
     "walk_pushes",
+    "channel_gains",
+    "kicks",
 )
 
 

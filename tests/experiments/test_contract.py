@@ -17,6 +17,8 @@ TAUGHT = (
     "--task quadratic --seed 0 --nodes 12 --engine twin --duration 12 --washout 4 --rest-runs 0"
 )
 TINY = {
+    "adopt": "--model soft_arm --seeds 1 --periods 5 --rounds 0 --free-run 4 --after 4 --window 3 "
+    "--symbols 200 --streams 3",
     "benchmark": "--steps 20 --repeats 1 --sizes 10 --memory-steps 1000",
     "capacity": "--nodes 8 --symbols 150 --washout 20 --max-delays 5 2 --streams 6 "
     "--stream-symbols 12 --no-maps",
@@ -65,7 +67,7 @@ BAD = {  # an option that the experiment must refuse by its name, where it is no
     "render": ("--stills", "0"), "guided": ("--bodies", "0"), "search": ("--seeds", "0"),
     "success_rate": ("--seeds", "0"), "gaits": ("--seeds", "0"), "limit_cycle": ("--window", "-1"),
     "perturb": ("--seeds", "0"), "prune": ("--seeds", "0"), "swing_up": ("--seeds", "0"),
-    "certify": ("--copies", "0"),
+    "certify": ("--copies", "0"), "adopt": ("--seeds", "0"),
 }  # fmt: skip
 
 
@@ -95,7 +97,9 @@ def test_the_registry_is_complete():
     for entry in entries().values():
         assert entry.group in GROUPS
         assert 10 < len(entry.line) < 60
-    with pytest.raises(UnknownNameError, match="unknown experiment 'waltz'; valid choices: bench"):
+    with pytest.raises(
+        UnknownNameError, match="unknown experiment 'waltz'; valid choices: adopt, bench"
+    ):
         experiment_named("waltz")
 
 

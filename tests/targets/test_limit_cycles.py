@@ -185,6 +185,19 @@ def test_an_open_curve_is_refused():
         Target("none", 0.0, lambda t: np.column_stack([t, t]))
 
 
+def test_faster_is_the_same_orbit_in_less_time(any_target):
+    fast, times = any_target.faster(3.7), np.linspace(0.0, 20.0, 501)
+    assert fast.period == any_target.period / 3.7
+    assert np.abs(fast.sample(times) - any_target.sample(3.7 * times)).max() < 1e-11
+    if fast.rhs is not None:  # it solves the equation that it names
+        solution = solve_ivp(
+            fast.rhs, (0.0, fast.period), fast.sample([0.0])[0], rtol=1e-9, atol=1e-11
+        )
+        assert np.abs(solution.y[:, -1] - fast.sample([0.0])[0]).max() < 1e-7
+    with pytest.raises(InvalidArgumentError, match="pace"):
+        any_target.faster(0.0)
+
+
 def test_unknown_name_lists_the_targets():
     with pytest.raises(UnknownNameError) as caught:
         target("circle")

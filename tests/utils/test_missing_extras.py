@@ -26,6 +26,7 @@ STUDY = "from mcmj.search.study import Study; Study('s', {}, {'x': 1}, 0, startu
         ("zarr", "files", "import mcmj.simulation.trajectory_files.zarr"),
         ("h5py", "files", "import mcmj.simulation.trajectory_files.openprc"),
         ("dm_control", "control", "import mcmj.learning.environments.environment"),
+        ("dm_control", "control", "import mcmj.experiments.adopt.suite_models"),
         ("dm_env", "control", "import mcmj.learning.environments.environment"),
         ("gymnasium", "gym", "import mcmj.learning.environments.gymnasium_env"),
         ("optuna", "search", STUDY),
