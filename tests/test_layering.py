@@ -56,6 +56,7 @@ MUJOCO = {
     "core.callbacks.offsets",
     "experiments.adopt.suite_models",
     "experiments.benchmark.full_scene",
+    "experiments.benchmark.models",
     "experiments.benchmark.run",
     "experiments.limit_cycle.loop_cost",  # times bare mj_step
     "learning.environments.environment",

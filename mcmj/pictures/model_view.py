@@ -12,7 +12,7 @@ from mcmj.pictures.video_file import Picture
 from mcmj.utils.validation import Array
 
 BAND = 30  # pixels, above and below
-REACH = 2.6  # distance of the camera, over the size of what moves
+REACH = 2.3  # distance of the camera, over the size of what moves
 AZIMUTH, ELEVATION = 120.0, -20.0  # degrees
 SHADOW = 1024  # pixels of the map: without shadows feet seem to float
 SEEN = 200  # samples that say where the camera goes

@@ -90,8 +90,8 @@ class Style:
         if self.speed == 1.0:
             return "real time"
         if self.speed > 1.0:
-            return f"{self.speed:g} x faster"
-        return f"slowed {1 / self.speed:g} x"
+            return f"{self.speed:.2g} x faster"
+        return f"slowed {1 / self.speed:.2g} x"
 
 
 @contextmanager

@@ -8,13 +8,12 @@ from rich.console import Console
 from rich.table import Table
 
 from mcmj.experiments.adopt.config import Config, total_readouts
-from mcmj.experiments.adopt.figure import figures
+from mcmj.experiments.adopt.figure import figures, film_of
 from mcmj.experiments.adopt.result import RUNS, Adopted, Result
 from mcmj.experiments.adopt.run import run
 from mcmj.experiments.base import Experiment, counting, table_of
-from mcmj.pictures.film import ModelFilm
 from mcmj.pictures.opengl import RenderingUnavailableError
-from mcmj.pictures.rendering import ORBIT_POINTS, Style, write_film
+from mcmj.pictures.rendering import Style, write_film
 from mcmj.utils import files
 from mcmj.utils.errors import McmjError, McmjWarning
 
@@ -34,15 +33,10 @@ def write(result: Result, folder: Path) -> None:
 def write_films(result: Result, folder: Path) -> None:
     """An MP4 for every model, and its last picture as PNG."""
     for name, one in _that_moved(result).items():
-        assert one.motion is not None
-        motion = one.motion
-        film = ModelFilm(
-            one.reservoir.model, motion.times, motion.qpos, motion.outputs,
-            one.target.orbit(ORBIT_POINTS),
-        )  # fmt: skip
+        film = film_of(one)
         paths = {suffix: folder / f"{Path(name).stem}{suffix}" for suffix in (".mp4", ".png")}
         try:
-            write_film(film, paths, Style(speed=float(motion.times[-1]) / SECONDS), stills=1)
+            write_film(film, paths, Style(speed=float(film.times[-1]) / SECONDS), stills=1)
         except RenderingUnavailableError as error:
             warnings.warn(f"no film: {error}", McmjWarning, stacklevel=2)
             return

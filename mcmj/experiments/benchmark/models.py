@@ -1,0 +1,68 @@
+"""What the closed loop costs on the models of mcmj.experiments.adopt, which are no bodies."""
+
+from functools import partial
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from mcmj.experiments.adopt.models import ADOPTIONS
+from mcmj.experiments.benchmark.config import READOUT_SIZE, Config
+from mcmj.simulation.models.adopt import read_spec
+from mcmj.simulation.reservoir import Reservoir
+from mcmj.utils.errors import MissingExtraError
+from mcmj.utils.timing import Work, interleaved_seconds, median_ratio
+
+COPIES = 8
+OUTPUTS = 2
+
+
+def model_costs(config: Config, body: object) -> dict[str, object]:
+    """Closed loop over bare mj_step of the same model, and two threads against one.
+
+    Signals and outputs are recorded. Both start from rest; the readout does next to nothing, so
+    that both make the same motion. Copies record nothing. Models of dm_control's suite are left
+    out where it is not installed.
+    """
+    ratios, threads = {}, {}
+    for name, adoption in ADOPTIONS.items():
+        try:
+            spec = read_spec(adoption.load(), adoption.timestep)
+        except MissingExtraError:
+            continue
+        ratios[name] = _closed_over_bare(config, spec, adoption.sensors)
+        threads[name] = _two_threads(config, spec, adoption.sensors)
+    return {"reservoir_ratio": ratios, "reservoir_threads2_speedup": threads}
+
+
+def _reservoir(spec: mujoco.MjSpec, sensors: tuple[str, ...], **options: Any) -> Reservoir:
+    """Every output drives all actuators, next to nothing."""
+    names = [actuator.name for actuator in spec.actuators]
+    channels = {f"x{c + 1}": dict.fromkeys(names, READOUT_SIZE) for c in range(OUTPUTS)}
+    reservoir = Reservoir(spec, sensors=sensors, channels=channels, **options)
+    reservoir.set_readout(np.full((reservoir.n_signals, OUTPUTS), READOUT_SIZE))
+    return reservoir
+
+
+def _closed_over_bare(config: Config, spec: mujoco.MjSpec, sensors: tuple[str, ...]) -> float:
+    closed, model = _reservoir(spec, sensors), spec.compile()
+    data = mujoco.MjData(model)
+
+    def bare() -> None:
+        mujoco.mj_resetData(model, data)
+        mujoco.mj_step(model, data, nstep=config.steps)
+
+    def loop() -> None:
+        closed.reset()
+        closed.rollout(config.steps)
+
+    seconds = interleaved_seconds({"closed": loop, "bare": bare}, config.repeats)
+    return median_ratio(seconds, "closed", "bare")
+
+
+def _two_threads(config: Config, spec: mujoco.MjSpec, sensors: tuple[str, ...]) -> float:
+    works: dict[str, Work] = {}
+    for count in (1, 2):
+        copies = _reservoir(spec, sensors, copies=COPIES, threads=count)
+        works[f"{count}"] = partial(copies.rollout, max(10, config.steps // COPIES), record=())
+    return median_ratio(interleaved_seconds(works, config.repeats), "1", "2")
