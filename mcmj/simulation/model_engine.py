@@ -30,6 +30,8 @@ class ModelEngine(BatchEngine):
     def __init__(self, adopted: AdoptedModel, *, copies: int, threads: int) -> None:
         install.install_control()
         self.adopted = adopted
+        # a state that blew up is kept for the error message
+        adopted.model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET.value
         first, n_outputs = adopted.first, len(adopted.channel_names)
         dofs = np.arange(adopted.model.nv)
         self._kept = np.zeros((copies, len(adopted.kept)))

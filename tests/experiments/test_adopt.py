@@ -57,7 +57,7 @@ def signals_of(model, data, names):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("integrator", ["Euler", "implicitfast", "RK4"])
+@pytest.mark.parametrize("integrator", ["Euler", "implicit", "implicitfast", "discrete", "RK4"])
 @pytest.mark.parametrize("name", list(ADOPTIONS))
 def test_signals_and_outputs_agree_with_a_plain_loop(name, integrator):
     made, target = built(name, integrator)

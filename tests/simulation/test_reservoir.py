@@ -10,7 +10,13 @@ import pytest
 import mcmj
 from mcmj import Reservoir
 from mcmj.metrics.orbits import orbit_error
-from mcmj.utils.errors import BodyFileError, InvalidArgumentError, McmjError, UnknownNameError
+from mcmj.utils.errors import (
+    BodyFileError,
+    DivergenceError,
+    InvalidArgumentError,
+    McmjError,
+    UnknownNameError,
+)
 
 ARM = """
 <mujoco><option timestep="0.002" gravity="0 0 -9.81"/>
@@ -193,8 +199,10 @@ def test_what_a_model_has_not_is_named(changes, error, text):
 
 def test_a_run_that_blows_up_names_the_joint():
     reservoir = Reservoir(ARM, sensors="jointvel:*", channels=["free"], w_out=np.full((3, 1), 1e6))
-    with pytest.raises(mcmj.utils.errors.DivergenceError, match=r"blew up after t = .* at joint"):
+    with pytest.raises(DivergenceError, match=r"blew up after t = .* at joint") as caught:
         reservoir.rollout(20_000, offset=np.ones((20_000, 1)))
+    assert caught.value.steps_done == pytest.approx(caught.value.time / 0.002)
+    assert 1 < caught.value.steps_done < 20_000
 
 
 def test_a_file_is_complete(tmp_path):
@@ -442,3 +450,69 @@ def test_defaults_of_a_model_are_not_those_of_its_channels():
         mujoco.mj_step(model, data)
     assert np.array_equal(run.qpos[-1], data.qpos)
     assert np.abs(data.qpos[0]) > 0.1
+
+
+KINDS = """
+<mujoco><option timestep="0.002"/><worldbody>
+  <body name="a" pos="0 0 1"><joint name="j1" axis="0 1 0" damping="2" stiffness="20"/>
+    <geom type="capsule" fromto="0 0 0 .4 0 0" size=".04"/><site name="tip_a" pos=".4 0 0"/>
+    <body name="b" pos=".4 0 0"><joint name="j2" type="ball" damping="1" stiffness="10"/>
+      <geom type="capsule" fromto="0 0 0 .3 0 0" size=".03"/><site name="tip" pos=".3 0 .1"/>
+    </body></body>
+  <site name="wall" pos="0.5 0 1.4"/></worldbody>
+<tendon><spatial name="t" stiffness="5" springlength="0"><site site="wall"/><site site="tip"/>
+  </spatial></tendon>
+<actuator>
+  <motor name="site" site="tip" gear="0 0 1 0 .1 0" ctrlrange="-.5 .5" ctrllimited="true"/>
+  <motor name="between" site="tip" refsite="wall" gear="1 0 0 0 0 0"/>
+  <position name="pull" tendon="t" kp="20" forcerange="-2 2" forcelimited="true"/>
+  <velocity name="rate" joint="j1" kv="3"/>
+  <muscle name="muscle" tendon="t" force="5" lengthrange=".1 .6"/>
+  <general name="exact" joint="j1" dyntype="filterexact" dynprm=".02" gainprm="2" biastype="affine"
+   biasprm=".1 -1 -.2"/>
+  <general name="sum" joint="j1" dyntype="integrator" gainprm="1" actlimited="true"
+   actrange="-.3 .3"/>
+  <motor name="ball" joint="j2" gear=".2 .1 -.3"/>
+</actuator>
+<sensor><ballquat name="quat" joint="j2"/><ballangvel name="spin" joint="j2"/>
+  <tendonpos name="length" tendon="t"/><velocimeter name="speed" site="tip"/>
+  <actuatorfrc name="force" actuator="muscle"/></sensor></mujoco>"""
+
+
+@pytest.mark.parametrize("integrator", ["Euler", "RK4", "implicit", "implicitfast", "discrete"])
+def test_every_kind_of_actuator_is_driven_as_by_hand(integrator):
+    """Motors, servos, muscles, integrators, filters; on joints, balls, tendons and sites."""
+    spec = mujoco.MjSpec.from_string(KINDS)
+    names = [actuator.name for actuator in spec.actuators]
+    rng = np.random.default_rng(2)
+    gains = rng.uniform(-1.0, 1.0, (2, len(names)))
+    channels = {f"y{c}": dict(zip(names, row.tolist(), strict=True)) for c, row in enumerate(gains)}
+    step = 2e-4 if integrator == "RK4" else 2e-3  # dampers are stiff
+    reservoir = Reservoir(
+        KINDS, sensors="*", channels=channels, integrator=integrator, timestep=step
+    )
+    w_out = 0.02 * rng.normal(size=(reservoir.n_signals + 1, 2))
+    offset = np.cumsum(rng.normal(size=(T, 2)), axis=0) / np.sqrt(T)
+    reservoir.set_readout(w_out)
+    run = reservoir.rollout(offset=offset, record=("signals", "outputs", "qpos"))
+    spec.option.integrator, spec.option.timestep = reservoir.model.opt.integrator, step
+    data = mujoco.MjData(model := spec.compile())
+    late = np.zeros(1)
+    for k in range(T):
+        mujoco.mj_fwdPosition(model, data)
+        mujoco.mj_sensorPos(model, data)
+        mujoco.mj_fwdVelocity(model, data)
+        mujoco.mj_sensorVel(model, data)
+        signals = np.r_[data.sensordata[:-1], late]
+        outputs = signals @ w_out[:-1] + w_out[-1]
+        assert np.abs(run.qpos[k] - data.qpos).max() < 1e-12
+        assert np.abs(run.signals[k] - signals).max() < 1e-11
+        assert np.abs(run.outputs[k] - outputs).max() < 1e-12
+        data.ctrl[:] = (outputs + offset[k]) @ gains
+        if integrator == "RK4":
+            mujoco.mj_forward(model, data)
+            late = data.sensordata[-1:].copy()
+        mujoco.mj_step(model, data)
+        if integrator != "RK4":
+            late = data.sensordata[-1:].copy()
+    assert np.abs(np.diff(run.qpos, axis=0)).max() > 1e-4
