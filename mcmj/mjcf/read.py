@@ -55,7 +55,7 @@ def load_model(xml_or_path: str | Path, max_bytes: int = MAX_BYTES) -> mujoco.Mj
 def _compiled(text: str, source: str) -> mujoco.MjModel:
     try:
         with quiet_warnings():
-            return mujoco.MjModel.from_xml_string(text)
+            return mujoco.MjSpec.from_string(text).compile()  # see core.callbacks.offsets
     except (ValueError, mujoco.FatalError) as error:
         reason = " ".join(str(error).split())
         raise BodyFileError(f"{source}: MuJoCo cannot compile it: {reason}") from error
