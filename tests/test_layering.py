@@ -71,6 +71,7 @@ MUJOCO = {
     "pictures.window.plots",
     "pictures.window.viewer",
     "pictures.walk_video",
+    "robots.ground",
     "robots.trunk_walker",
     "robots.walk_scene",
     "simulation.batch_engine",
