@@ -25,6 +25,7 @@ from mcmj.utils.validation import require_count, require_number
 Model: TypeAlias = str | PathLike[str] | mujoco.MjSpec | mujoco.MjModel
 
 OURS = "mcmj:"  # begins the names of what is added
+CLOCK = f"{OURS}time"  # a sensor
 _COPIED = (
     "type",
     "objtype",
@@ -143,29 +144,13 @@ def _with_channels(
 ) -> AdoptedModel:
     if NUMERIC in [numeric.name for numeric in spec.numerics]:
         raise InvalidArgumentError("model", "one that is not a reservoir yet", NUMERIC)
-    spec.add_sensor(name=f"{OURS}time", type=mujoco.mjtSensor.mjSENS_CLOCK)
-    bare = _compiled(spec)
-    actuators = {bare.actuator(a).name: a for a in range(bare.nu)}
+    spec.add_sensor(name=CLOCK, type=mujoco.mjtSensor.mjSENS_CLOCK)
     law_reads = heard if feedback_delay == 0 else _delayed(spec, heard, feedback_delay)
-    signals, signal_names, late = _addresses(_compiled(spec), heard)
-    read = _addresses(_compiled(spec), law_reads)[0].tolist()
-    slow = [place for place, is_late in zip(read, late, strict=True) if is_late]
-    law_drives = [
-        (actuators[name], channel, gain)
-        for channel, gains in enumerate([*outputs.values(), *inputs.values()])
-        for name, gain in gains.items()
-    ]
-    law = Law(
-        outputs=len(outputs),
-        first=bare.nu,
-        clock=int(bare.sensor(f"{OURS}time").adr[0]),
-        signals=len(read),
-        late=len(slow),
-        drives=len(law_drives),
-        memory=bare.nuserdata,
-    )
+    bare = _compiled(spec)
+    signals, signal_names, late = _addresses(bare, heard)
+    read = _addresses(bare, law_reads)[0]
     delay = max(0.0, feedback_delay - 0.5) * spec.option.timestep
-    numbers = block(law, read, slow, law_drives, delay)
+    numbers = _law_block(bare, outputs, inputs, read, read[late], delay)
     spec.nuserdata = bare.nuserdata + (1 + int(late.sum()) if late.any() else 0)
     spec.nuser_actuator = max(bare.nuser_actuator, len(signals) + 1)
     for kind, name in [*(("output", n) for n in outputs), *(("input", n) for n in inputs)]:
@@ -188,8 +173,34 @@ def _with_channels(
         input_names=tuple(inputs),
         first=bare.nu,
         memory=bare.nuserdata,
-        kept=np.array([*slow, *(signals[late] if feedback_delay else ())], np.int64),
+        kept=np.array([*read[late], *(signals[late] if feedback_delay else ())], np.int64),
     )
+
+
+def _law_block(
+    bare: mujoco.MjModel,
+    outputs: dict[str, dict[str, float]],
+    inputs: dict[str, dict[str, float]],
+    read: npt.NDArray[np.int64],
+    late: npt.NDArray[np.int64],
+    delay: float,
+) -> list[float]:
+    """The law's numbers for a model without its channels, see reservoir_law.block."""
+    drives = [
+        (bare.actuator(name).id, channel, gain)
+        for channel, gains in enumerate([*outputs.values(), *inputs.values()])
+        for name, gain in gains.items()
+    ]
+    law = Law(
+        outputs=len(outputs),
+        first=bare.nu,
+        clock=int(bare.sensor(CLOCK).adr[0]),
+        signals=len(read),
+        late=len(late),
+        drives=len(drives),
+        memory=bare.nuserdata,
+    )
+    return block(law, read.tolist(), late.tolist(), drives, delay)
 
 
 def _add_channel(spec: mujoco.MjSpec, name: str, width: int) -> None:
