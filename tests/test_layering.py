@@ -81,6 +81,7 @@ MUJOCO = {
     "simulation.model_engine",
     "simulation.models.adopt",
     "simulation.models.compiled",
+    "simulation.models.damage",
     "simulation.models.names",
     "simulation.models.reservoir_file",
     "simulation.reservoir",

@@ -125,7 +125,14 @@ class Simulation(Reservoir):
         return self.body.n_forces
 
     def to_mjcf(self) -> str:
-        """The body as MJCF with its readout, to the last bit; see mcmj.to_mjcf."""
+        """The body as MJCF with its readout, to the last bit; see mcmj.to_mjcf.
+
+        Raises:
+            InvalidArgumentError: it was altered, which no body file says; or there are copies.
+        """
+        self._require_one()
+        if self._alterations:
+            raise InvalidArgumentError("simulation", "one that was not altered", "cuts or masses")
         return to_mjcf(
             self.body,
             timestep=self.options.physics_step,
