@@ -86,7 +86,8 @@ def body_of_model(model: mujoco.MjModel) -> Body:
     if len(nodes) < 2 or len(springs) == 0:
         raise BodyFileError(
             "not an mcmj body: expected sites n0, n1, .. and spatial tendons s0, s1, .., got "
-            f"{len(nodes)} such sites and {len(springs)} such tendons"
+            f"{len(nodes)} such sites and {len(springs)} such tendons; any other model can be a "
+            "Reservoir, whose to_mjcf() is for `mcmj view` and `mcmj capacity --reservoir`"
         )
     owner = model.site_bodyid[nodes]
     fixed = owner == 0

@@ -162,6 +162,7 @@ class Simulation(Reservoir):
         weights = None if masses is None else checked_masses(self.body, masses)
         self._engine.alter(checked_cut(self.body, cut), weights)
         self._alterations += ((tuple(cut), weights),)
+        self.__dict__.pop("_fingerprint", None)
 
     @property
     def state(self) -> State:
@@ -192,6 +193,8 @@ class Simulation(Reservoir):
                 continue  # snapshots are those of bodies before they had one
             array = getattr(self.body, field.name)
             parts.append(repr(array.shape).encode() + array.tobytes())
+        for cut, masses in self._alterations:
+            parts.append(repr(cut).encode() + (b"" if masses is None else masses.tobytes()))
         return b"".join(parts)
 
     def _described(self) -> str:

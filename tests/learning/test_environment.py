@@ -166,7 +166,7 @@ def test_what_does_not_fit_is_said(one):
         Setting(actions="forces")
     with pytest.raises(InvalidArgumentError, match="actions: expected channels"):
         environment.load("quadratic", setting=Setting(actions="inputs"))
-    with pytest.raises(InvalidArgumentError, match="reservoir: expected 4 outputs, got 2"):
+    with pytest.raises(InvalidArgumentError, match="reservoir: expected 4 feedback"):
         environment.make(one.physics.reservoir, named_target("trot"))
     simulation, goal = one.physics.reservoir, mcmj.target("lissajous")
     with pytest.raises(InvalidArgumentError, match="control_timestep: expected a multiple of"):
