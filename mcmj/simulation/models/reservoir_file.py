@@ -87,5 +87,5 @@ def read_reservoir(model: Model) -> tuple[mujoco.MjSpec, dict[str, Any], Array |
         spec.delete(element)
     for key in spec.keys:
         if len(key.ctrl):
-            key.ctrl = key.ctrl[: len(spec.actuators)]
+            key.ctrl = list(key.ctrl)[: len(spec.actuators)]
     return spec, asked, w_out
