@@ -56,7 +56,7 @@ class FilmFigure:
         )
         words.text(0.17, 0.015, pace + film.scales, fontsize=LARGE)
         grid = self._figure.add_gridspec(
-            2, 1, left=share + 0.065, right=0.985, bottom=0.1, top=0.94, hspace=0.42,
+            2, 1, left=share + 0.062, right=0.99, bottom=0.1, top=0.94, hspace=0.42,
             height_ratios=(1.9, 1.0),
         )  # fmt: skip
         has_plane = film.outputs.shape[1] >= 2
