@@ -20,7 +20,6 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numba
-import numpy as np
 from numba import types
 
 from mcmj.core.callbacks.offsets import byte_offset, word_offsets
@@ -129,8 +128,8 @@ def find_block(model, at):
 
 @numba.njit(**COMPILE)
 def whole(value, end):
-    """A number of a model if it is a whole one from 0 to end - 1, else -1; NaN is not."""
-    return numba.int64(value) if 0.0 <= value < end and value == np.floor(value) else -1
+    """The whole part of a number of a model if it is from 0 to end - 1, else -1; NaN is not."""
+    return numba.int64(value) if 0.0 <= value < end else -1
 
 
 @numba.njit(**COMPILE)
