@@ -162,7 +162,8 @@ def _pair(outputs: Array, targets: Array) -> tuple[Array, Array]:
 def _ranges(values: Array) -> Array:
     """Largest minus smallest value of every column, quickly."""
     columns = np.ascontiguousarray(values.T)
-    return columns.max(axis=1) - columns.min(axis=1)
+    found: Array = columns.max(axis=1) - columns.min(axis=1)
+    return found
 
 
 def _at_rest(values: Array) -> bool:

@@ -58,11 +58,9 @@ def test_a_damaged_file_is_computed_anew(folder, damage):
     else:
         at = whole.index(WANTED["a"].tobytes())
         flipped = whole[:at] + bytes([whole[at] ^ 1]) + whole[at + 1 :]
-        path.write_bytes(
-            {"empty": b"", "cut": whole[: len(whole) // 2], "flipped": flipped, "text": b"no"}[
-                damage
-            ]
-        )
+        cut = whole[: len(whole) // 2]
+        files = {"empty": b"", "cut": cut, "flipped": flipped, "text": b"no"}
+        path.write_bytes(files[damage])
     check(kept_arrays("test", 1, compute))
     assert compute.calls == 2
 

@@ -38,7 +38,8 @@ def _over_physics(config: Config, name: str) -> float:
         counts[0] += steps
 
     own_body = run(trial, on_steps=count).body
-    steps, ratios, begin = counts[0], [], time.process_time()
+    steps, begin = counts[0], time.process_time()
+    ratios: list[float] = []
     simulation = Simulation(own_body, w_out=small_readout(own_body), engine="twin")
     while len(ratios) < config.repeats and (not ratios or time.process_time() - begin < ENOUGH):
         whole = _seconds(lambda: run(trial).metrics)
