@@ -16,7 +16,8 @@ from scipy.linalg.lapack import dgeqrt, dpotrf
 
 from mcmj.utils.validation import Array
 
-SAMPLE = 1024  # rows of a sample, and rows that are reflected at a time
+SAMPLE = 512  # rows of a sample, or four for every column
+REFLECTED = 1024  # rows at a time
 PANEL = 2048  # rows of C at a time: with S they stay in the processor's cache
 COLUMNS = 16  # of a block of reflections
 LARGEST = 1e4  # squared norm of a column of C: rounding errors of R grow with it
@@ -58,8 +59,8 @@ def _by_gram(sampled: Array, factor: Array, block: Array) -> Array | None:
 
 def _by_reflections(factor: Array, block: Array) -> Array:
     """Some rows at a time (TSQR: Demmel et al. 2012)."""
-    for first in range(0, len(block), SAMPLE):
-        rows = np.asfortranarray(np.vstack([factor, block[first : first + SAMPLE]]))
+    for first in range(0, len(block), REFLECTED):
+        rows = np.asfortranarray(np.vstack([factor, block[first : first + REFLECTED]]))
         reflected, _, _ = dgeqrt(min(COLUMNS, *rows.shape), rows, overwrite_a=True)
         factor = np.triu(reflected[: block.shape[1]])
     return factor
