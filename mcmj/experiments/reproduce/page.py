@@ -49,15 +49,9 @@ def page(
         account: configuration and versions, in a line.
         costs: of the commands, by name.
     """
-    judged = [outcome for part in parts for outcome in outcomes[part.name]]
-    decided = [outcome for outcome in judged if outcome.decided]
-    held = sum(outcome.holds for outcome in decided)
     sections = "\n".join(_section(part, commands, files) for part in parts if commands[part.name])
     rows = [_row(part, outcome) for part in parts for outcome in outcomes[part.name]]
-    few = len(judged) - len(decided)
-    left = (
-        f" Of {few} more, over fewer than {FEW} bodies, the successes are counted." if few else ""
-    )
+    count = _count([outcome for part in parts for outcome in outcomes[part.name]])
     return f"""<!DOCTYPE html>
 <html lang="en"><head><meta charset="utf-8">
 <meta name="viewport" content="width=device-width, initial-scale=1"><title>{escape(title)}</title>
@@ -65,14 +59,25 @@ def page(
 <h1>{escape(title)}</h1>
 <p>After Hauser, Ijspeert, Füchslin, Pfeifer and Maass, <em>The role of feedback in morphological
 computation with compliant bodies</em>, Biol. Cybern. 106 (2012) 595&ndash;613.
-<strong>{held} of {len(decided)} claims hold</strong>: the successes do not refute the rate that is
-needed (95 % Wilson interval).{left}</p>
+{count}</p>
 {_table(OF_CLAIMS, rows)}
 {sections}
 {_times(costs)}
 <p class="small">{escape(account)}</p>
 </body></html>
 """
+
+
+def _count(outcomes: Sequence[Outcome]) -> str:
+    decided = [outcome for outcome in outcomes if outcome.decided]
+    held, few = sum(outcome.holds for outcome in decided), len(outcomes) - len(decided)
+    text = (
+        f"<strong>{held} of {len(decided)} claims hold</strong>: the successes do not refute the "
+        "rate that is needed (95 % Wilson interval)."
+    )
+    if few:
+        text += f" Of {few} more, over fewer than {FEW} bodies, the successes are only counted."
+    return text
 
 
 def _section(

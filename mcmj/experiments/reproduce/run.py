@@ -100,7 +100,8 @@ def run(config: Config, *, folder: Path, on_steps: OnSteps = lambda steps: None)
     failures += _execute([pair for pair in missing if pair[0].alone], folder, 1, on_steps)
     minutes = (time.perf_counter() - begin) / 60 if len(missing) == len(runs) else None
     outcomes = {p.name: _outcomes(config, p, folder) for p in config.parts}
-    costs = {one.name: cost_of(one, folder) for one, o in runs if finished(one, o, folder)}
+    ends = {one.name: cost_of(one, folder) for one, o in runs if finished(one, o, folder)}
+    costs = {name: cost for name, cost in ends.items() if cost is not None}
     return Result(config, outcomes, failures, costs, minutes)
 
 

@@ -96,9 +96,12 @@ def metrics_of(run: Command, folder: Path) -> dict[str, Any]:
     return found
 
 
-def cost_of(run: Command, folder: Path) -> Cost:
-    """What a finished run took."""
-    return Cost(**json.loads((folder / run.name / COST).read_text(encoding="utf-8")))
+def cost_of(run: Command, folder: Path) -> Cost | None:
+    """What a finished run took; None if it was not kept."""
+    try:
+        return Cost(**json.loads((folder / run.name / COST).read_text(encoding="utf-8")))
+    except OSError:
+        return None
 
 
 def _account(run: Command, options: Sequence[str]) -> str:
