@@ -6,15 +6,11 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 from scipy.linalg import svd
-from scipy.linalg.lapack import dgeqrt
-from threadpoolctl import ThreadpoolController
 
+from mcmj.learning.fold import fold
 from mcmj.utils.errors import InvalidArgumentError
+from mcmj.utils.threads import one_blas_thread
 from mcmj.utils.validation import Array, as_array, require_above, require_number
-
-_PANEL = 1024  # rows folded in at a time: with R they stay in the processor's cache
-_COLUMNS = 16  # of a block of Householder reflections
-_BLAS = ThreadpoolController().select(user_api="blas")  # found once: looking takes milliseconds
 
 
 @dataclass(frozen=True)
@@ -88,7 +84,7 @@ class Regression:
         targets = range(first + self._n_lengths, factor.shape[1])
         part = copy.copy(self)
         part._n_lengths = len(springs)
-        with _BLAS.limit(limits=1):
+        with one_blas_thread():
             part._factor = np.asarray(np.linalg.qr(factor[:, [*kept, *targets]], mode="r"))
         return part
 
@@ -122,20 +118,20 @@ class Regression:
             raise InvalidArgumentError("lengths", f"{self._n_lengths} columns", x.shape[1])
         elif y.shape[1] != len(self._mean):
             raise InvalidArgumentError("targets", f"{len(self._mean)} columns", y.shape[1])
-        with _BLAS.limit(limits=1):  # the same bits on any number of cores
-            self._factor = _fold(self._factor, block)
+        with one_blas_thread():  # the same bits on any number of cores
+            self._factor = fold(self._factor, block)
+            self._count(y, weights)
         self._rows += len(y)
-        self._count(y, weights)
 
     def _count(self, y: Array, weights: Array) -> None:
         """Merge mean and scatter of new targets (Chan et al. 1979): large means do no harm."""
         before, new = self._weight, float(weights.sum())
         if new == 0:
             return
-        mean = np.average(y, axis=0, weights=weights)
+        mean = weights @ y / new
         shift = mean - self._mean
         self._weight = before + new
-        scatter = (weights[:, None] * (y - mean) ** 2).sum()
+        scatter = (weights @ (y - mean) ** 2).sum()
         self._scatter += scatter + (shift**2).sum() * before * new / self._weight
         self._mean = self._mean + shift * new / self._weight
 
@@ -152,7 +148,7 @@ class Regression:
         factor = self._checked_factor()
         n_unknowns = self._n_lengths + int(self._bias)
         top, reached = factor[:, :n_unknowns], factor[:, n_unknowns:]
-        with _BLAS.limit(limits=1):
+        with one_blas_thread():
             weights, values = self._minimise(top, reached, ridge)
             residual = reached - top @ weights
         rank = int((values > values[0] * max(self._rows, n_unknowns) * np.finfo(float).eps).sum())
@@ -180,20 +176,6 @@ class Regression:
         goal = np.vstack([reached, np.zeros((len(penalty), reached.shape[1]))])
         u, damped, vt = svd(stacked, full_matrices=False)
         return vt.T @ ((u.T @ goal) / damped[:, None]), values
-
-
-def _fold(factor: Array, block: Array) -> Array:
-    """R of the QR decomposition of [factor; block], panel by panel (Demmel et al. 2012, TSQR).
-
-    Several times faster than one decomposition of all rows, which goes to memory for each
-    column; as stable.
-    """
-    columns = block.shape[1]
-    for first in range(0, len(block), _PANEL):
-        panel = np.asfortranarray(np.vstack([factor, block[first : first + _PANEL]]))
-        reflected, _, _ = dgeqrt(min(_COLUMNS, *panel.shape), panel, overwrite_a=True)
-        factor = np.triu(reflected[:columns])
-    return factor
 
 
 def _condition_number(values: Array, unknowns: int) -> float:

@@ -145,8 +145,10 @@ class Course:
             times = step * (first + steps).astype(np.float64)
             clean = lesson.outputs(times)
             lengths = self._lengths(lesson, times, clean)
-            learned = (steps >= washout) & (steps % self._teaching.every == 0)
-            if learned.any():
+            every = self._teaching.every
+            earliest = -(-max(start, washout) // every) * every
+            learned = slice(earliest - start, None, every)
+            if earliest < start + len(steps):
                 weight = lesson.weight
                 weights = weight(times[learned]) if callable(weight) else weight
                 regression.add(lengths[learned], clean[learned], weight=weights)

@@ -1,9 +1,9 @@
 """Errors of generated outputs; each name says its definition."""
 
 import numpy as np
-import numpy.typing as npt
-from scipy.spatial import cKDTree
 
+from mcmj.metrics.lags import mean_mismatch, relative_mismatch
+from mcmj.metrics.nearest import distances_to_curve, rows_within
 from mcmj.targets.limit_cycles import Target
 from mcmj.utils.errors import InvalidArgumentError
 from mcmj.utils.validation import Array, as_array, require_number
@@ -33,8 +33,8 @@ def orbit_error(outputs: Array, target: Target) -> float:
     """
     generated = as_array("outputs", outputs, (None, target.n_outputs))
     wanted = target.orbit(ORBIT_POINTS)
-    there = _distances_to_curve(generated, wanted, closed=True)
-    back = _distances_to_curve(wanted, generated, closed=False)
+    there = distances_to_curve(generated, wanted, closed=True)
+    back = distances_to_curve(wanted, generated, closed=False)
     return max(_rms(there), _rms(back)) / rms_radius(wanted)
 
 
@@ -42,7 +42,7 @@ def orbit_distances(outputs: Array, target: Target) -> Array:
     """Distances (T,) of outputs (T, n_outputs) to the target orbit, over its RMS radius."""
     generated = as_array("outputs", outputs, (None, target.n_outputs))
     wanted = target.orbit(ORBIT_POINTS)
-    return _distances_to_curve(generated, wanted, closed=True) / rms_radius(wanted)
+    return distances_to_curve(generated, wanted, closed=True) / rms_radius(wanted)
 
 
 def recovery_time(
@@ -54,8 +54,10 @@ def recovery_time(
     target orbit than tolerance x its RMS radius must come a period before the end.
     """
     require_number("tolerance", tolerance, 0.0, open_low=True)
-    outside = np.flatnonzero(orbit_distances(outputs, target) > tolerance)
-    time = (int(outside[-1]) + 1) * timestep if outside.size else 0.0
+    generated = as_array("outputs", outputs, (None, target.n_outputs))
+    wanted = target.orbit(ORBIT_POINTS)
+    inside = rows_within(generated, wanted, tolerance * rms_radius(wanted))
+    time = (len(generated) - inside) * timestep
     return time if time <= len(outputs) * timestep - target.period else np.inf
 
 
@@ -114,8 +116,8 @@ def relative_period_error(outputs: Array, timestep: float, target: Target) -> fl
 def relative_amplitude_error(outputs: Array, target: Target) -> float:
     """Largest over the outputs of |A - A*| / A*, A the range (max - min) of an output."""
     values = as_array("outputs", outputs, (None, target.n_outputs))
-    wanted = np.ptp(target.orbit(ORBIT_POINTS), axis=0)
-    return float(np.abs(np.ptp(values, axis=0) / wanted - 1.0).max())
+    wanted = _ranges(target.orbit(ORBIT_POINTS))
+    return float(np.abs(_ranges(values) / wanted - 1.0).max())
 
 
 def nrmse_std(outputs: Array, targets: Array) -> float:
@@ -136,7 +138,7 @@ def nrmse_range(outputs: Array, targets: Array) -> float:
     Args, Raises: as for `nrmse_std`.
     """
     found, wanted = _pair(outputs, targets)
-    return _rms((found - wanted) / np.ptp(wanted, axis=0))
+    return _rms((found - wanted) / _ranges(wanted))
 
 
 def nmse_var(outputs: Array, targets: Array) -> float:
@@ -151,38 +153,25 @@ def nmse_var(outputs: Array, targets: Array) -> float:
 def _pair(outputs: Array, targets: Array) -> tuple[Array, Array]:
     wanted = as_array("targets", targets, (None, None))
     found = as_array("outputs", outputs, wanted.shape)
-    still = np.flatnonzero(np.ptp(wanted, axis=0) == 0.0)
+    still = np.flatnonzero(_ranges(wanted) == 0.0)
     if still.size:
         raise InvalidArgumentError("targets", "columns that change", f"column {still[0]} constant")
     return found, wanted
 
 
+def _ranges(values: Array) -> Array:
+    """Largest minus smallest value of every column, quickly."""
+    columns = np.ascontiguousarray(values.T)
+    found: Array = columns.max(axis=1) - columns.min(axis=1)
+    return found
+
+
 def _at_rest(values: Array) -> bool:
-    return bool((np.ptp(values, axis=0) <= 1e-9 * (1.0 + np.abs(values).max())).all())
+    return bool((_ranges(values) <= 1e-9 * (1.0 + np.abs(values).max())).all())
 
 
 def _rms(distances: Array) -> float:
     return float(np.sqrt((distances**2).mean()))
-
-
-def _distances_to_curve(points: Array, curve: Array, *, closed: bool) -> Array:
-    """Distances (P,) to a polygon: to the segments on both sides of the nearest vertex."""
-    _, nearest = cKDTree(curve).query(points)
-    last = len(curve) - 1
-    before = nearest - 1 if closed else np.maximum(nearest - 1, 0)
-    after = np.where(nearest == last, 0 if closed else last, nearest + 1)
-    vertex = curve[nearest]
-    sides = [_to_segment(points, vertex, curve[other]) for other in (before, after)]
-    return np.minimum(*sides)
-
-
-def _to_segment(points: Array, start: Array, end: Array) -> Array:
-    along = end - start
-    squared = (along**2).sum(axis=1)
-    fraction = ((points - start) * along).sum(axis=1) / np.where(squared > 0, squared, 1.0)
-    foot = start + np.clip(fraction, 0.0, 1.0)[:, None] * along
-    found: Array = np.linalg.norm(points - foot, axis=1)
-    return found
 
 
 def _first_repeat(values: Array, guess: float) -> tuple[float, int]:
@@ -191,17 +180,10 @@ def _first_repeat(values: Array, guess: float) -> tuple[float, int]:
     spacing = max(1, int(guess / 400))
     sparse = values[::spacing] - values.mean(axis=0)
     lags = np.arange(max(1, int(0.2 * guess / spacing)), int(highest / spacing))
-    costs = np.array([_difference(sparse, int(lag)) for lag in lags])
+    costs = relative_mismatch(sparse, lags)
     inside = np.flatnonzero((costs[1:-1] <= costs[:-2]) & (costs[1:-1] <= costs[2:])) + 1
     deep = inside[costs[inside] < min(REPEATS, costs[inside].min(initial=REPEATS) + 0.01)]
     return (float(lags[deep[0]] * spacing) if deep.size else np.nan), spacing
-
-
-def _difference(values: Array, lag: int) -> float:
-    """Mean squared difference from the lagged copy, over twice the overlap's variance."""
-    head, tail = values[:-lag], values[lag:]
-    power = (head**2).sum() + (tail**2).sum()
-    return float(((head - tail) ** 2).sum() / power) if power > 0 else 1.0
 
 
 def _best_lag(values: Array, centre: float, reach: float) -> float:
@@ -209,16 +191,9 @@ def _best_lag(values: Array, centre: float, reach: float) -> float:
     low = max(1, int(np.floor(centre - reach)))
     high = min(len(values) - 2, int(np.ceil(centre + reach)))
     lags = np.arange(low, high + 1)
-    costs = _mismatch(values, lags.astype(np.int64))
+    costs = mean_mismatch(values, lags)
     best = int(np.clip(costs.argmin(), 1, len(lags) - 2))
     left, middle, right = costs[best - 1 : best + 2]
     bend = left - 2 * middle + right
     shift = 0.5 * (left - right) / bend if bend > 0 else 0.0
     return float(lags[best] + np.clip(shift, -1.0, 1.0))
-
-
-def _mismatch(values: Array, lags: npt.NDArray[np.int64]) -> Array:
-    """Mean squared difference between values and their lagged copies, same window for all."""
-    window = len(values) - int(lags[-1])
-    head = values[:window]
-    return np.array([((values[lag : lag + window] - head) ** 2).mean() for lag in lags])

@@ -60,7 +60,7 @@ def new_figure(width: float, height: float) -> Figure:
 def save(figure: Figure, path: str | Path) -> None:
     """Write a figure as PNG, whole or not at all."""
     with whole_file(path) as temporary:
-        figure.savefig(temporary, dpi=130, format="png")
+        figure.savefig(temporary, dpi=130, format="png", pil_kwargs={"compress_level": 3})
 
 
 def plot_body(axes: Axes, body: Body) -> None:
@@ -137,7 +137,7 @@ def count_in_whole_numbers(axes: Axes) -> None:
 
 def best_phase(outputs: Array, target: Target, times: Array) -> float:
     """Time shift of the target that fits the outputs best: phases drift apart, shapes do not."""
-    sparse = slice(None, None, max(1, len(times) // 2000))
+    sparse = slice(None, None, max(1, len(times) // 400))
     shifts = np.linspace(-0.5, 0.5, 401) * target.period
     costs = [((target.sample(times[sparse] + s) - outputs[sparse]) ** 2).mean() for s in shifts]
     return float(shifts[int(np.argmin(costs))])

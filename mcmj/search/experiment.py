@@ -25,8 +25,6 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-from threadpoolctl import threadpool_limits
-
 from mcmj.core.integrators import DEFAULT_INTEGRATOR
 from mcmj.core.random_body import draw_body
 from mcmj.metrics.metric_paths import matched, numbers_at, quantity
@@ -43,6 +41,7 @@ from mcmj.utils.errors import (
     UnknownNameError,
 )
 from mcmj.utils.files import plain, versions
+from mcmj.utils.threads import one_blas_thread
 
 PACKAGE = "mcmj.experiments"
 ORBIT_ERRORS = "*/orbit_error"
@@ -151,7 +150,7 @@ def evaluate(trial: Trial) -> Outcome:
     status, message = DONE, ""
     metrics: Any = {}
     begin = time.perf_counter()
-    with warnings.catch_warnings(), threadpool_limits(1, "blas"):
+    with warnings.catch_warnings(), one_blas_thread():
         warnings.simplefilter("ignore", McmjWarning)  # a search meets bad bodies on purpose
         try:
             metrics = plain(module.run(trial.config).metrics)

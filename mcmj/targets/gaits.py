@@ -12,7 +12,7 @@ stance (the foot is carried backwards) and rises in swing. The signal is x_1 .. 
 
 import functools
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 
 import numpy as np
 from scipy.special import expit
@@ -81,6 +81,7 @@ class Gait:
             transient=self.transient,
             longest_period=LONGEST_PERIOD,
             observe=lambda states: states[:, :4],
+            kept=asdict(self),
         )
         # a spline is sampled far faster than the integrator's polynomials
         return from_array(self.name, cycle.orbit(POINTS), cycle.period / POINTS)

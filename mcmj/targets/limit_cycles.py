@@ -1,15 +1,20 @@
 """What a body is taught: limit cycles from an accurate integrator, closed curves, arrays."""
 
 import functools
+import hashlib
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+import scipy
 from scipy.integrate import solve_ivp
 from scipy.interpolate import CubicSpline
 
+from mcmj.targets.dense_output import DenseOutput
+from mcmj.targets.kept_arrays import kept_arrays
 from mcmj.utils.errors import InvalidArgumentError, McmjError, UnknownNameError
 from mcmj.utils.validation import MOST_STEPS, Array, as_array, require_count, require_number
 
@@ -32,6 +37,7 @@ class Target:
     period: float
     curve: Callable[[Array], Array] = field(repr=False)
     rhs: Callable[[float, Array], Array] | None = field(default=None, repr=False)
+    _orbits: dict[int, Array] = field(default_factory=dict, init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         require_number("period", self.period, 0.0, open_low=True)
@@ -67,8 +73,12 @@ class Target:
         )
 
     def orbit(self, points: int) -> Array:
-        """One period as a closed polygon (points, n_outputs), equally spaced in time."""
-        return self.sample(np.arange(points) * (self.period / points))
+        """One period as a closed polygon (points, n_outputs), equally spaced in time; read only."""
+        if points not in self._orbits:
+            found = self.sample(np.arange(points) * (self.period / points))
+            found.flags.writeable = False
+            self._orbits[points] = found
+        return self._orbits[points]
 
 
 def limit_cycle(
@@ -79,6 +89,7 @@ def limit_cycle(
     transient: float = 100.0,
     longest_period: float = 100.0,
     observe: Callable[[Array], Array] | None = None,
+    kept: object = None,
 ) -> Target:
     """The limit cycle that x' = rhs(t, x) reaches from a start, by DOP853.
 
@@ -91,11 +102,38 @@ def limit_cycle(
         transient: time to reach the cycle [s].
         longest_period: give up looking for a return after this time [s].
         observe: function of states (T, n) -> the signal (T, n_outputs); default: the states.
+        kept: all that `rhs` depends on besides the code of mcmj.targets, as JSON types; with it
+            the cycle is kept on the disk (mcmj.targets.kept_arrays).
 
     Raises:
         McmjError: no cycle is reached: the system rests, diverges or does not come back.
     """
-    origin = integrate(rhs, np.asarray(start, dtype=np.float64), transient).y[:, -1]
+    origin = np.asarray(start, dtype=np.float64)
+
+    def find() -> dict[str, Array]:
+        period, states = _first_return(name, rhs, origin, transient, longest_period)
+        return {"period": np.array(period), **states.arrays}
+
+    if kept is None:
+        found = find()
+    else:
+        asked = [name, kept, origin, transient, longest_period, RTOL, ATOL]
+        found = kept_arrays("cycle", [asked, code_digest()], find)
+    period, states = float(found["period"]), DenseOutput.from_arrays(found)
+    if observe is None:
+        return Target(name, period, states, rhs)
+    return Target(name, period, lambda times: observe(states(times)))
+
+
+def _first_return(
+    name: str,
+    rhs: Callable[[float, Array], Array],
+    start: Array,
+    transient: float,
+    longest_period: float,
+) -> tuple[float, DenseOutput]:
+    """The period [s] of a limit cycle, and its states."""
+    origin = integrate(rhs, start, transient).y[:, -1]
     flow = np.asarray(rhs(0.0, origin))
     if not np.isfinite(origin).all() or np.linalg.norm(flow) < 1e-9:
         raise McmjError(f"{name}: no limit cycle after {transient:g} s, x = {origin}")
@@ -113,9 +151,7 @@ def limit_cycle(
     ]
     if not returns:
         raise McmjError(f"{name}: no return to x = {origin} within {longest_period:g} s")
-    if observe is None:
-        return Target(name, returns[0], lambda times: solution.sol(times).T, rhs)
-    return Target(name, returns[0], lambda times: observe(solution.sol(times).T))
+    return returns[0], DenseOutput.of(solution).until(returns[0])
 
 
 def from_array(name: str, values: npt.ArrayLike, timestep: float) -> Target:
@@ -135,14 +171,17 @@ def from_array(name: str, values: npt.ArrayLike, timestep: float) -> Target:
 def van_der_pol() -> Target:
     """x1' = x2, x2' = -x1 + (1 - x1^2) x2 (Hauser et al. 2012, Eq. 5)."""
     return limit_cycle(
-        "van_der_pol", lambda t, x: np.array([x[1], -x[0] + (1 - x[0] ** 2) * x[1]]), [1.0, 0.0]
+        "van_der_pol",
+        lambda t, x: np.array([x[1], -x[0] + (1 - x[0] ** 2) * x[1]]),
+        [1.0, 0.0],
+        kept=(),
     )
 
 
 def quadratic(eps: float = 7.0) -> Target:
     """x1' = x1 + x2 - eps x1 r^2, x2' = -2 x1 + x2 - x2 r^2, r^2 = x1^2 + x2^2 (section 6.1)."""
     require_number("eps", eps, 0.0, open_low=True)
-    return limit_cycle("quadratic", lambda t, x: quadratic_flow(x, eps), [0.1, 0.0])
+    return limit_cycle("quadratic", lambda t, x: quadratic_flow(x, eps), [0.1, 0.0], kept=eps)
 
 
 def quadratic_flow(x: Array, eps: float) -> Array:
@@ -177,6 +216,15 @@ def target(name: str) -> Target:
     if name not in TARGETS:
         raise UnknownNameError("target", name, TARGETS)
     return TARGETS[name]()
+
+
+@functools.cache
+def code_digest() -> str:
+    """Of what kept targets come from: the code of this folder, and the integrator's version."""
+    digest = hashlib.sha256(f"{scipy.__version__} {np.__version__}".encode())
+    for path in sorted(Path(__file__).parent.glob("*.py")):
+        digest.update(path.read_bytes())
+    return digest.hexdigest()
 
 
 def integrate(

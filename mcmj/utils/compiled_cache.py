@@ -24,7 +24,7 @@ from mcmj.utils.errors import McmjWarning
 
 _HERE = Path(__file__).parent
 _PACKAGE = _HERE.parent
-_COMPILED = ("core/callbacks", "reference/twin")  # folders of compiled code
+_COMPILED = ("core/callbacks", "reference/twin", "targets", "metrics")  # folders of compiled code
 
 
 @functools.cache  # every package of compiled code asks, before it is imported

@@ -174,14 +174,17 @@ def write_metrics(
 def write_arrays(
     path: str | Path, arrays: Mapping[str, np.ndarray], config: object, seed: int
 ) -> None:
-    """An NPZ file of arrays, with config, seed and versions as JSON text in `provenance`."""
+    """An NPZ file of arrays, with config, seed and versions as JSON text in `provenance`.
+
+    Not compressed: outputs have few zeros, and lose 7 % in a second for 40 MB.
+    """
     for name, array in arrays.items():
         if np.asarray(array).dtype.hasobject:
             raise InvalidArgumentError(f"arrays[{name!r}]", "numbers, not Python objects", array)
     with whole_file(path) as temporary, temporary.open("wb") as file:
         origin = np.array(json.dumps(account(config, seed)))
         contents: dict[str, Any] = {"provenance": origin, **arrays}
-        np.savez_compressed(file, **contents)
+        np.savez(file, **contents)
 
 
 def account(config: object, seed: int) -> dict[str, object]:

@@ -1,12 +1,15 @@
 """Independent runs side by side on all cores, in one process: rollouts release the GIL."""
 
+import functools
 import os
 from collections.abc import Callable, Sequence
 from concurrent.futures import FIRST_EXCEPTION, ThreadPoolExecutor, wait
+from contextlib import AbstractContextManager
 from threading import Event
 from typing import TypeVar
 
-from threadpoolctl import threadpool_limits
+import scipy.linalg  # noqa: F401  (its library is to be found)
+from threadpoolctl import ThreadpoolController
 
 from mcmj.utils.progress import OnSteps
 
@@ -16,6 +19,17 @@ R = TypeVar("R")
 
 class _StoppedError(Exception):
     """Ends a run whose result nobody wants any more."""
+
+
+def one_blas_thread() -> AbstractContextManager[object]:
+    """A block in which linear algebra is done in one thread: the same bits on any machine."""
+    limit: AbstractContextManager[object] = _blas().limit(limits=1)
+    return limit
+
+
+@functools.cache  # looking for libraries takes milliseconds
+def _blas() -> ThreadpoolController:
+    return ThreadpoolController().select(user_api="blas")
 
 
 def in_threads(work: Callable[[T, OnSteps], R], items: Sequence[T], on_steps: OnSteps) -> list[R]:
@@ -31,7 +45,7 @@ def in_threads(work: Callable[[T, OnSteps], R], items: Sequence[T], on_steps: On
         on_steps(steps)
 
     # BLAS threads on top would wait for each other
-    with threadpool_limits(1, "blas"), ThreadPoolExecutor(os.cpu_count()) as pool:
+    with one_blas_thread(), ThreadPoolExecutor(os.cpu_count()) as pool:
         runs = [pool.submit(work, item, report) for item in items]
         try:
             done, _ = wait(runs, return_when=FIRST_EXCEPTION)

@@ -36,9 +36,8 @@ def as_array(name: str, value: object, shape: Sequence[int | None]) -> Array:
         n is not None and n != m for n, m in zip(shape, array.shape, strict=True)
     ):
         raise InvalidArgumentError(name, f"shape {wanted}", f"shape {array.shape}")
-    bad = np.argwhere(~np.isfinite(array))
-    if bad.size:
-        where = tuple(int(i) for i in bad[0])
+    if not np.isfinite(array).all():
+        where = tuple(int(i) for i in np.argwhere(~np.isfinite(array))[0])
         raise InvalidArgumentError(name, "finite numbers", f"{array[where]} at index {where}")
     return array
 

@@ -19,7 +19,7 @@ TAUGHT = (
 TINY = {
     "adopt": "--model soft_arm --seeds 1 --periods 5 --rounds 0 --free-run 4 --after 4 --window 3 "
     "--symbols 200 --streams 3",
-    "benchmark": "--steps 20 --repeats 1 --sizes 10 --memory-steps 1000",
+    "benchmark": "--steps 20 --repeats 1 --sizes 10 --memory-steps 1000 --trials limit_cycle",
     "capacity": "--nodes 8 --symbols 150 --washout 20 --max-delays 5 2 --streams 6 "
     "--stream-symbols 12 --no-maps",
     "certify": "--task quadratic --body quadratic --free-run 15 --window 13 --recovery 22 "

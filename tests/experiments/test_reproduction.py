@@ -8,10 +8,11 @@ import sys
 import numpy as np
 import pytest
 
+from mcmj.experiments.reproduce.captions import OF_RUNS, caption
 from mcmj.experiments.reproduce.claims import Claim, Command, chosen, judge
 from mcmj.experiments.reproduce.page import page
 from mcmj.experiments.reproduce.paper import PARTS
-from mcmj.experiments.reproduce.runner import execute, finished, metrics_of
+from mcmj.experiments.reproduce.runner import Cost, cost_of, execute, finished, metrics_of
 from mcmj.pictures.plotting import new_figure, save
 from mcmj.utils.errors import McmjError, UnknownNameError
 from mcmj.utils.files import write_metrics
@@ -123,3 +124,59 @@ def test_an_account_of_another_version_is_not_taken(tmp_path):
     write_metrics(tmp_path / "one" / "metrics.json", "script", {}, 0, {})
     (tmp_path / "one" / "account.json").write_text("{}")
     assert not finished(run, (), tmp_path)
+
+
+def test_few_bodies_are_counted_and_not_judged():
+    two = {"b": [{"z": 0.0}, {"z": 0.0}, {"z": 1.0}]}
+    outcome = judge(Claim("it works", "yes", "run", ("b/*/z",)), two)
+    assert outcome.holds
+    assert outcome.verdict == "2 of 3"
+    assert outcome.plain["verdict"] == "2 of 3"
+    assert judge(Claim("all", "all", "run", ("b/*/z",), needed=1.0), two).verdict == "no"
+    many = {"b": [{"z": 0.0}] * 20}
+    assert judge(Claim("it works", "yes", "run", ("b/*/z",)), many).verdict == "yes"
+    one = judge(Claim("it works", "yes", "run", ("b/0/z",)), two)
+    assert one.verdict == "yes"
+
+
+def test_the_page_has_no_empty_headings_and_captions_in_words(tmp_path):
+    part, bare = PARTS[2], PARTS[0]
+    figure = new_figure(2.0, 2.0)
+    figure.add_subplot().plot([0, 1])
+    (tmp_path / "perturb").mkdir()
+    save(figure, tmp_path / "perturb" / "noise_tolerance.png")
+    outcome = judge(Claim("it works", "yes", "run", ("a/x",)), METRICS)
+    files = {part.name: [tmp_path / "perturb" / "noise_tolerance.png"], bare.name: []}
+    html = page(
+        "A title", [bare, part], {bare.name: [], part.name: [outcome]}, files,
+        {bare.name: [], part.name: ["mcmj perturb"]}, "{}", {"perturb": Cost(3.25, None)},
+    )  # fmt: skip
+    assert 'name="viewport"' in html
+    assert bare.title not in html
+    assert re.findall("<h2.*?>(.*?)</h2>", html) == [part.title, "Where the time goes"]
+    (told,) = re.findall("<figcaption>(.*?)</figcaption>", html)
+    assert told.startswith("Orbit error after some time of noise")
+    cells = re.findall(r'<td data-label="([^"]+)"', html)
+    assert len(cells) == 7 + 4  # each names its column, where there is no room for a head
+
+
+def test_every_picture_of_the_runs_has_a_caption_of_its_own():
+    assert len(set(OF_RUNS.values())) == len(OF_RUNS)
+    runs = {run.name for part in PARTS for run in part.runs}
+    assert {run for run, _ in OF_RUNS} == runs
+    assert caption("limit_cycle", "quadratic") == (
+        "The body in its free run: the quadratic limit cycle."
+    )
+    assert caption("perturb", "another_figure") == "Perturb: another figure."
+
+
+def test_what_a_command_took_is_kept(tmp_path):
+    (tmp_path / "script.py").write_text(SCRIPT)
+    run, started = Command("one", "script", (), ()), []
+    execute(run, (), tmp_path, (sys.executable, str(tmp_path / "script.py")), started.append)
+    cost = cost_of(run, tmp_path)
+    assert len(started) == 1
+    assert cost is not None
+    assert cost_of(Command("two", "script", (), ()), tmp_path) is None
+    assert 0 < cost.seconds < 60
+    assert cost.processor_seconds is None or 0 < cost.processor_seconds < 60

@@ -6,8 +6,9 @@ import numpy as np
 
 from mcmj.core.body import Body
 from mcmj.core.random_body import MOST_NODES
-from mcmj.utils.validation import MOST_STEPS, Array, require_count, require_seed
+from mcmj.utils.validation import MOST_STEPS, Array, require_count, require_name, require_seed
 
+TRIALS = ("limit_cycle", "perturb", "swing_up", "gaits", "input_driven")
 READOUT_SIZE = 1e-4  # small weights: what they are costs nothing, and the loop stays quiet
 
 
@@ -22,6 +23,7 @@ class Config:
         repeats: rounds, of which the median counts.
         seed: of the bodies.
         memory_steps: length of the run whose peak memory is measured; 0: leave it out.
+        trials: experiments of which a whole trial is measured.
     """
 
     nodes: int = 30
@@ -30,12 +32,14 @@ class Config:
     repeats: int = 9
     seed: int = 0
     memory_steps: int = 1_000_000
+    trials: tuple[str, ...] = TRIALS
 
     def __post_init__(self) -> None:
         require_count("steps", self.steps, 10)
         require_count("repeats", self.repeats, 1)
         require_seed("seed", self.seed)
         require_count("memory_steps", self.memory_steps, 0, MOST_STEPS)
+        require_name("trial", TRIALS, *self.trials)
         require_count("number of sizes", len(self.sizes), 1)
         for name, sizes in (("nodes", (self.nodes,)), ("sizes", self.sizes)):
             for size in sizes:

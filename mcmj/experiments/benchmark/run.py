@@ -17,6 +17,7 @@ from mcmj.experiments.benchmark.config import Config, small_readout
 from mcmj.experiments.benchmark.full_scene import full_scene
 from mcmj.experiments.benchmark.models import model_costs
 from mcmj.experiments.benchmark.process import machine, memory, start_up
+from mcmj.experiments.benchmark.trials import trial_costs
 from mcmj.reference.twin.population import Population
 from mcmj.simulation.corrected_run import Stretch, run_corrected
 from mcmj.simulation.ensemble import Ensemble
@@ -205,6 +206,7 @@ PARTS = (
     model_costs,
     learning_costs,
     twin_costs,
+    trial_costs,
     thread_speedups,
     scene_costs,
     start_up,

@@ -14,6 +14,7 @@ from mcmj.metrics.metric_paths import numbers_at
 from mcmj.metrics.success_rates import success_rate
 from mcmj.utils.errors import UnknownNameError
 
+FEW = 10  # bodies, below which a rate is neither shown nor refuted
 FORMATS = {"error": "{:.2%}", "time": "{:.1f} s", "ratio": "{:.3f}"}
 
 
@@ -25,12 +26,14 @@ class Command:
         name: of its folder.
         script: in scripts/, without suffix.
         full, quick: its options; None: not run in that mode.
+        alone: it measures times: no other command runs beside it.
     """
 
     name: str
     script: str
     full: tuple[str, ...]
     quick: tuple[str, ...] | None
+    alone: bool = False
 
 
 @dataclass(frozen=True)
@@ -94,6 +97,19 @@ class Outcome:
         return f"{middle} ({texts[0]} to {texts[-1]})"
 
     @property
+    def decided(self) -> bool:
+        """Whether there are bodies enough for a rate, or only one was claimed."""
+        few = 1 < self.rate["of"] < FEW
+        return self.claim.needed == 1.0 or not few
+
+    @property
+    def verdict(self) -> str:
+        """yes or no; of a few bodies only how many."""
+        if not self.decided:
+            return f"{self.rate['successes']} of {self.rate['of']}"
+        return "yes" if self.holds else "no"
+
+    @property
     def plain(self) -> dict[str, object]:
         """As written to metrics.json."""
         finite = [v if np.isfinite(v) else None for v in self.values]
@@ -105,6 +121,7 @@ class Outcome:
             "success": self.rate,
             "limit": self.claim.limit,
             "holds": self.holds,
+            "verdict": self.verdict,
         }
 
 

@@ -29,7 +29,7 @@ def write(result: Result, folder: Path) -> None:
         name: [" ".join(["mcmj", run.script, *options]) for run, options in some]
         for name, some in runs.items()
     }
-    html = page(TITLE, config.parts, result.outcomes, pictures, commands, account)
+    html = page(TITLE, config.parts, result.outcomes, pictures, commands, account, result.costs)
     files.write_text(folder / "reproduction.html", html)
 
 
@@ -39,7 +39,7 @@ def show(result: Result, console: Console) -> None:
     for name, some in result.outcomes.items():
         for outcome in some:
             count = f"{outcome.rate['successes']} of {outcome.rate['of']}"
-            verdict = "yes" if outcome.holds else "[red]no"
+            verdict = "[red]no" if outcome.verdict == "no" else outcome.verdict
             table.add_row(name, outcome.claim.text, outcome.ours, count, verdict)
     console.print(table)
     console.print("the page: reproduction.html")

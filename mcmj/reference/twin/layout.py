@@ -37,12 +37,21 @@ def to_bodies(bodies: Sequence[Body], readouts: Sequence[object]) -> Bodies:
         w_out=_aligned((count, n_out * width)),
         bias=_aligned((count, n_out)),
     )
-    for b, (body, value) in enumerate(zip(bodies, readouts, strict=True)):
+    for b, body in enumerate(bodies):
         _fill(layout, b, body, nodes, width)
+    return with_readouts(layout, bodies, readouts)
+
+
+def with_readouts(layout: Bodies, bodies: Sequence[Body], readouts: Sequence[object]) -> Bodies:
+    """The layout of these bodies, with other readouts."""
+    count, n_out = layout.bias.shape
+    width = layout.laws.shape[1] // 5
+    new = layout._replace(w_out=_aligned(layout.w_out.shape), bias=_aligned((count, n_out)))
+    for b, (body, value) in enumerate(zip(bodies, readouts, strict=True)):
         readout = Readout.of(value, body.n_springs, n_out)
-        layout.w_out[b].reshape(-1, width)[:, : body.n_springs] = readout.weights.T
-        layout.bias[b] = readout.bias
-    return layout
+        new.w_out[b].reshape(n_out, width)[:, : body.n_springs] = readout.weights.T
+        new.bias[b] = readout.bias
+    return new
 
 
 def _fill(layout: Bodies, b: int, body: Body, nodes: int, width: int) -> None:

@@ -17,6 +17,7 @@ from mcmj.reference.twin.layout import (
     to_kernel_state,
     to_packs,
     to_schedule,
+    with_readouts,
 )
 from mcmj.reference.twin.packs import Packs, integrate_packs
 from mcmj.reference.twin.stepping import (
@@ -73,12 +74,15 @@ class Population:
         self._packed = packed
         self.steps_done = 0
         self.set_states([rest(body) for body in bodies])
-        self.set_readouts(readouts)
+        lay_out = to_packs if packed else to_bodies
+        self._layout: Bodies | Packs = lay_out(self.bodies, readouts)
 
     def set_readouts(self, readouts: Sequence[object]) -> None:
         """Replace all readouts, from the next step on."""
-        lay_out = to_packs if self._packed else to_bodies
-        self._layout: Bodies | Packs = lay_out(self.bodies, readouts)
+        if isinstance(self._layout, Bodies):
+            self._layout = with_readouts(self._layout, self.bodies, readouts)
+        else:
+            self._layout = to_packs(self.bodies, readouts)
 
     @property
     def kernel_state(self) -> KernelState:
