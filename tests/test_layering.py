@@ -52,7 +52,6 @@ MOST_MODULES, MOST_ROOT_ENTRIES = 14, 16
 MUJOCO = {
     "analysis.loops.chart",
     "core.callbacks.install",
-    "core.callbacks.library",
     "core.callbacks.offsets",
     "experiments.adopt.suite_models",
     "experiments.benchmark.full_scene",

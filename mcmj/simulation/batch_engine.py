@@ -59,6 +59,7 @@ class BatchEngine:
     advice = "try a smaller step, another integrator, or smaller outputs"
     _lenient = False  # copies that blow up are no errors
     _passive = False  # whether mcmj's callback makes passive forces
+    _sensors = False  # whether mcmj's callback measures lengths
     _stage = POSITION_STAGE  # up to which sensors are of use
 
     def __init__(
@@ -149,7 +150,7 @@ class BatchEngine:
 
     def install(self) -> None:
         """Callbacks again: somebody may have taken them out since the last chunk."""
-        install.install(passive=self._passive)
+        install.install(passive=self._passive, sensors=self._sensors)
 
     def _advance(self, drive: Drive, start: int, stop: int, fields: list[str]) -> dict[str, Array]:
         """Fields (copies, steps, n) after each physics step of control steps start .. stop - 1."""

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 
-from mcmj.core.callbacks.library import function_address
+from mcmj.core.callbacks.offsets import function_address
 from mcmj.core.callbacks.online_learning import Learner, Machine, advance, write_weights
 from mcmj.simulation.batch_engine import BatchEngine
 from mcmj.simulation.reservoir import Reservoir

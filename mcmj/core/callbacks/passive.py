@@ -28,6 +28,7 @@ from mcmj.core.callbacks.leapfrog import (
     memory_rows,
     runs_leapfrog,
 )
+from mcmj.core.callbacks.node_springs import add_node_springs
 from mcmj.core.callbacks.offsets import byte_offset, word_offsets
 from mcmj.core.callbacks.pointers import (
     COUPLED_TAG,
@@ -39,15 +40,18 @@ from mcmj.core.callbacks.pointers import (
     doubles,
     integers,
 )
+from mcmj.core.callbacks.readout_law import add_channels
+from mcmj.core.callbacks.spring_table import read_table
 
 SPRING_USER_SIZE = 7
 
 _MODEL = (
-    "nv ntendon nuserdata nnumeric nnumericdata numeric_adr numeric_data dof_M0 nuser_tendon "
+    "nq nv nu ntendon nuserdata nnumeric nnumericdata numeric_adr numeric_size numeric_data dof_M0 "
+    "nuser_actuator nsensordata actuator_user actuator_biasprm nuser_tendon "
     "tendon_user tendon_damping tendon_dampingpoly ten_J_rownnz ten_J_rowadr ten_J_colind"
 )
 _DATA = (
-    "time qvel userdata ten_J ten_length ten_velocity qfrc_damper qfrc_passive qfrc_actuator "
+    "time qpos qvel ctrl sensordata userdata ten_J ten_length ten_velocity qfrc_damper qfrc_passive qfrc_actuator "
     "qfrc_applied"
 )
 _named_tuple: Any = namedtuple  # mypy wants literal names
@@ -66,14 +70,18 @@ def compile_passive() -> CFunction:
     )
 
     def passive(model, data):
-        leapfrog = runs_leapfrog(model, at)
+        leapfrog, table = runs_leapfrog(model, at), read_table(model, at)
         if leapfrog:
             begin_step(model, data, at)
         if model[at.nuser_tendon] >= SPRING_USER_SIZE:
             add_springs(model, data, at, leapfrog)
+        if table.springs > 0:
+            add_node_springs(model, data, at, table, leapfrog)
         if leapfrog:
             add_dampers(model, data, at)
-            finish_step(model, data, at)
+            finish_step(model, data, at, table)
+        else:
+            add_channels(model, data, at, table, doubles(data[at.qfrc_passive]))
 
     return numba.cfunc(types.void(WORDS, WORDS), cache=True)(passive).ctypes
 
