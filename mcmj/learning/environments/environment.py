@@ -209,6 +209,8 @@ def make(
         InvalidArgumentError: a target, input or setting that does not fit the reservoir.
     """
     setting = setting or Setting()
+    if isinstance(reservoir, Simulation):
+        reservoir = reservoir.with_tendons()  # springs that are seen
     if reservoir.n_outputs != target.n_outputs:
         raise InvalidArgumentError("reservoir", f"{target.n_outputs} outputs", reservoir.n_outputs)
     setting.check_step(reservoir.timestep)
