@@ -13,12 +13,16 @@ from mcmj.mjcf.write import to_mjcf
 
 
 def has_tendons(options: Options) -> bool:
-    """Where asked for, and where an integrator needs MuJoCo's derivatives of the springs' forces."""
+    """Where asked for, and where an integrator needs the derivatives of the springs' forces."""
     return options.engine == TENDONS or integrator_named(options.integrator).implicit
 
 
 def body_model(body: Body, options: Options) -> mujoco.MjModel:
-    """Compile it, the loop open, with room for a readout with bias."""
+    """Compile it, the loop open, with room for a readout with bias.
+
+    Raises:
+        BodyFileError: MuJoCo cannot compile it.
+    """
     if not has_tendons(options):
         return model_without_tendons(body, options)
     xml = to_mjcf(

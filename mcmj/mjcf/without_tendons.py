@@ -21,6 +21,7 @@ from mcmj.core.callbacks.spring_table import TABLE_TAG, memory_size
 from mcmj.core.integrators import integrator_named
 from mcmj.core.options import Options
 from mcmj.mjcf.write import JOINTS
+from mcmj.utils.errors import BodyFileError
 from mcmj.utils.quiet import quiet_warnings
 from mcmj.utils.validation import Array
 
@@ -46,7 +47,11 @@ def memory_of(options: Options) -> Memory:
 
 
 def model_without_tendons(body: Body, options: Options) -> mujoco.MjModel:
-    """Compile it, the loop open, with room for a readout with bias."""
+    """Compile it, the loop open, with room for a readout with bias.
+
+    Raises:
+        BodyFileError: MuJoCo cannot compile it.
+    """
     scheme, memory = integrator_named(options.integrator), memory_of(options)
     spec = mujoco.MjSpec()
     spec.modelname = "mcmj body without tendons"
@@ -70,8 +75,12 @@ def model_without_tendons(body: Body, options: Options) -> mujoco.MjModel:
             datatype=mujoco.mjtDataType.mjDATATYPE_REAL,
             dim=body.n_springs,
         )
-    with quiet_warnings():
-        return spec.compile()
+    try:
+        with quiet_warnings():
+            return spec.compile()
+    except (ValueError, mujoco.FatalError) as error:
+        reason = " ".join(str(error).split())
+        raise BodyFileError(f"{body!r}: MuJoCo cannot compile it: {reason}") from error
 
 
 def spring_table(body: Body, law: SpringLaw | None, memory: Memory) -> Array:
@@ -118,7 +127,8 @@ def _add_channels(spec: mujoco.MjSpec, body: Body, *, delayed: bool) -> None:
 
     They stand on the first joint, and MuJoCo's actuation is disabled.
     """
-    for name in (*(f"in{c}" for c in range(body.n_inputs)), *(f"fb{c}" for c in range(body.n_outputs))):
+    names = [f"in{c}" for c in range(body.n_inputs)] + [f"fb{c}" for c in range(body.n_outputs)]
+    for name in names:
         channel = spec.add_actuator(
             name=name, target=f"n{body.free[0]}x", trntype=mujoco.mjtTrn.mjTRN_JOINT
         )

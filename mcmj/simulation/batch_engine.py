@@ -17,7 +17,7 @@ from mcmj.core.callbacks import install
 from mcmj.core.rollout_arguments import Drive
 from mcmj.utils.errors import DivergenceError, InvalidArgumentError
 from mcmj.utils.forking import guard_against_forks
-from mcmj.utils.quiet import quiet_warnings
+from mcmj.utils.quiet import quiet_warnings, untimed
 from mcmj.utils.validation import Array, require_count
 
 _CTRL = mujoco.mjtState.mjSTATE_CTRL.value
@@ -158,7 +158,7 @@ class BatchEngine:
         steps = (stop - start) * self.substeps
         control, spec = self._control(drive, start, stop)
         before = self.bound("time").copy()
-        with quiet_warnings():
+        with untimed():
             rows: dict[str, Array] = self.batch.rollout(steps, control, spec, fields or [_TIME])
         self._check_alive(before, steps)
         self.steps_done += stop - start

@@ -45,7 +45,6 @@ CHANNELS = {"y": {"m1": 1.5, "p2": -0.5}, "z": {"f3": 1.0, "iv": 0.3}, "w": {"d"
 INTEGRATORS = ["Euler", "RK4", "implicit", "implicitfast"]
 T = 3000
 COMPILED = mujoco.MjModel.from_xml_string(ARM)
-mujoco.MjModel.from_xml_string("<mujoco/>")  # the last one, then
 
 
 def python_loop(reservoir, w_out, gate, offset, inputs):
@@ -192,6 +191,7 @@ def test_a_body_is_the_same_as_a_reservoir_and_as_a_simulation(body, w_bias):
     ],
 )
 def test_what_a_model_has_not_is_named(changes, error, text):
+    mujoco.MjModel.from_xml_string("<mujoco/>")  # the last one that MuJoCo can write
     given = {"model": ARM, "sensors": "q1", "channels": ["m1"]} | changes
     with pytest.raises(error, match=text):
         Reservoir(given.pop("model"), **given)

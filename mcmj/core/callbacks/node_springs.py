@@ -1,7 +1,7 @@
 """Forces of springs between nodes, of models without tendons (callbacks.spring_table).
 
     d = p_b - p_a,  l = |d|,  x1 = l - l0,  x2 = (v_b - v_a) . d / l
-    pull = k1 x1 + k3 x1^3 + d1 x2 + d3 x2^3, or a law of (x1, x2, k1, k3, d1, d3), or of all springs
+    pull = k1 x1 + k3 x1^3 + d1 x2 + d3 x2^3, or a law of (x1, x2, k1, k3, d1, d3), or one of all
     force on a:  pull d / l,  on b:  - pull d / l
 
 (Hauser et al. 2012, Eqs. 3, 6, 7). Two nodes at the same place pull along x, as MuJoCo's tendons.
@@ -85,7 +85,12 @@ def elongations(table, along, rates, x1, x2):
 @njit(**COMPILE)
 def polynomial_pulls(table, x1, x2, pull):
     """p(x1) + q(x2) of every spring."""
-    k1, k3, d1, d3 = (columns(table, K1), columns(table, K3), columns(table, D1), columns(table, D3))
+    k1, k3, d1, d3 = (
+        columns(table, K1),
+        columns(table, K3),
+        columns(table, D1),
+        columns(table, D3),
+    )
     for j in range(table.springs):
         p, q = k1[j] + k3[j] * x1[j] * x1[j], d1[j] + d3[j] * x2[j] * x2[j]
         pull[j] = x1[j] * p + x2[j] * q
@@ -94,7 +99,12 @@ def polynomial_pulls(table, x1, x2, pull):
 @njit(**COMPILE)
 def law_pulls(table, law, x1, x2, pull):
     """The law of one spring, for every spring."""
-    k1, k3, d1, d3 = (columns(table, K1), columns(table, K3), columns(table, D1), columns(table, D3))
+    k1, k3, d1, d3 = (
+        columns(table, K1),
+        columns(table, K3),
+        columns(table, D1),
+        columns(table, D3),
+    )
     for j in range(table.springs):
         pull[j] = call_pull(law, x1[j], x2[j], k1[j], k3[j], d1[j], d3[j])
 

@@ -1,8 +1,9 @@
-"""MuJoCo's passive force callback: custom spring laws, and what the leapfrog adds.
+"""MuJoCo's passive force callback: springs, custom spring laws, and what the leapfrog adds.
 
-MuJoCo holds one such callback per process, so one does both, each for the models that ask for
-it, and nothing for others. A tendon with user data [TAG, key of the law (callbacks.law_table), l0,
-k1, k3, d1, d3] is pulled through its sparse Jacobian by
+MuJoCo holds one such callback per process, so one does all, each for the models that ask for
+it, and nothing for others. A model without tendons has a table of its springs and channels
+(spring_table.py, node_springs.py, readout_law.py). A tendon with user data [TAG, key of the law
+(callbacks.law_table), l0, k1, k3, d1, d3] is pulled through its sparse Jacobian by
 
     law(l - l0, dl/dt, k1, k3, d1, d3)
 
@@ -51,8 +52,8 @@ _MODEL = (
     "tendon_user tendon_damping tendon_dampingpoly ten_J_rownnz ten_J_rowadr ten_J_colind"
 )
 _DATA = (
-    "time qpos qvel ctrl sensordata userdata ten_J ten_length ten_velocity qfrc_damper qfrc_passive qfrc_actuator "
-    "qfrc_applied"
+    "time qpos qvel ctrl sensordata userdata ten_J ten_length ten_velocity qfrc_damper "
+    "qfrc_passive qfrc_actuator qfrc_applied"
 )
 _named_tuple: Any = namedtuple  # mypy wants literal names
 # where they are, in words; and two options, in bytes

@@ -20,7 +20,6 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numba
-import numpy as np
 from numba import types
 
 from mcmj.core.callbacks.offsets import byte_offset, word_offsets
