@@ -86,7 +86,7 @@ def measure(data, at, table, first):
     node_values(table, doubles(data[at.qpos]), True, places)
     spans(table, places, along)
     lengths_of(table, along, doubles(data[at.sensordata] + 8 * first))
-    work[0] = 0.0
+    work[0] = 0.0  # it lives until here
 
 
 @njit(**COMPILE)

@@ -29,7 +29,7 @@ from mcmj.core.callbacks.spring_table import (
 )
 
 _SMALLEST = 1e-15  # [m], mjMINVAL
-_PARAMETERS = 7  # of a coupled law's row: as tendons' user data: tag, key, l0, k1, k3, d1, d3
+_PARAMETERS = 7  # of a coupled law's row, as tendons' user data: tag, key, l0, k1, k3, d1, d3
 
 
 @njit(**COMPILE)
@@ -64,7 +64,7 @@ def add_node_springs(model, data, at, table, leapfrog):
     else:
         law_pulls(table, law, doubles(x1), doubles(x2), pull)
     add_pulls(table, along, pull, places, doubles(data[at.qfrc_passive]))
-    work[0] = 0.0
+    work[0] = 0.0  # it lives until here
 
 
 @njit(**COMPILE)
@@ -119,7 +119,7 @@ def coupled_pulls(table, law, x1, x2, pull):
             rows[j, which] = column[j]
     address = int64(rows.ctypes.data)
     call_coupled(law, x1, x2, address, table.springs, _PARAMETERS, pull)
-    rows[0, 0] = 0.0
+    rows[0, 0] = 0.0  # it lives until here
 
 
 @njit(**COMPILE)
