@@ -1,7 +1,8 @@
 """What a reservoir is worth as a computer: memory and processing capacity, and its ranks.
 
 Symbols, independent and uniform in [-1, 1], drive one input for `hold` seconds each, the feedback
-open; the state is the signals at the end of each. See mcmj.metrics.capacity for the measures.
+open; the state is the signals at the start of the last step of each. See mcmj.metrics.capacity for
+the measures.
 """
 
 from dataclasses import dataclass
@@ -117,6 +118,11 @@ def capacities_of(reservoir: Reservoir, probe: Probe | None = None) -> Worth:
     p = Probe() if probe is None else probe
     if reservoir.copies is not None:
         raise InvalidArgumentError("reservoir", "one without copies", reservoir.copies)
+    least = 2 * reservoir.n_signals + max(p.max_delays) + 1
+    if p.symbols < least:
+        raise InvalidArgumentError(
+            "symbols", f"at least {least} for {reservoir.n_signals} signals", p.symbols
+        )
     driven, column = driven_channel(reservoir, p.channel)
     width = reservoir.n_inputs if driven == "inputs" else reservoir.n_outputs
     hold = max(1, round(p.hold / reservoir.timestep))

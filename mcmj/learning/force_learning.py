@@ -22,6 +22,7 @@ from mcmj.metrics import orbits
 from mcmj.simulation.corrected_run import Stretch, run_corrected
 from mcmj.simulation.reservoir import CHUNK, Reservoir
 from mcmj.targets.limit_cycles import Target
+from mcmj.targets.named import require_outputs
 from mcmj.utils.errors import DivergenceError
 from mcmj.utils.progress import OnSteps
 from mcmj.utils.seeds import stream
@@ -119,6 +120,7 @@ def force_learn(
         DivergenceError: the simulation blew up in its first round.
         InvalidArgumentError: the engine is the twin.
     """
+    require_outputs(simulation, target, "simulation")
     teacher = _Teacher(simulation, target, learning, seed, on_steps)
     learner = teacher.begin(stand)
     best, errors = (simulation.readout.rows, simulation.snapshot()), list[float]()

@@ -9,6 +9,7 @@ from mcmj.learning.lessons import Lesson, Teaching
 from mcmj.learning.regression import Fit, Regression
 from mcmj.simulation.reservoir import CHUNK, Reservoir
 from mcmj.targets.limit_cycles import Target
+from mcmj.targets.named import require_outputs
 from mcmj.utils.errors import InvalidArgumentError
 from mcmj.utils.progress import OnSteps
 from mcmj.utils.seeds import stream
@@ -35,7 +36,9 @@ def teach(
 
     Raises:
         DivergenceError: the body blew up under the teacher.
+        InvalidArgumentError: the target has other outputs, or there are copies.
     """
+    require_outputs(simulation, target, "simulation")
     return teach_lessons(
         simulation, lessons_of(target, teaching), teaching, seed, on_steps=on_steps
     )
@@ -82,6 +85,8 @@ class Course:
     """
 
     def __init__(self, simulation: Reservoir, teaching: Teaching, seed: int) -> None:
+        if simulation.copies is not None:
+            raise InvalidArgumentError("simulation", "one without copies", simulation.copies)
         self.simulation, self._teaching = simulation, teaching
         self._regression = Regression(bias=teaching.bias)
         self._noise = stream(seed, "teacher_noise")

@@ -55,7 +55,7 @@ def load_model(xml_or_path: str | Path, max_bytes: int = MAX_BYTES) -> mujoco.Mj
 def _compiled(text: str, source: str) -> mujoco.MjModel:
     try:
         with quiet_warnings():
-            return mujoco.MjModel.from_xml_string(text)
+            return mujoco.MjSpec.from_string(text).compile()  # see core.callbacks.offsets
     except (ValueError, mujoco.FatalError) as error:
         reason = " ".join(str(error).split())
         raise BodyFileError(f"{source}: MuJoCo cannot compile it: {reason}") from error
@@ -86,7 +86,8 @@ def body_of_model(model: mujoco.MjModel) -> Body:
     if len(nodes) < 2 or len(springs) == 0:
         raise BodyFileError(
             "not an mcmj body: expected sites n0, n1, .. and spatial tendons s0, s1, .., got "
-            f"{len(nodes)} such sites and {len(springs)} such tendons"
+            f"{len(nodes)} such sites and {len(springs)} such tendons; any other model can be a "
+            "Reservoir, whose to_mjcf() is for `mcmj view` and `mcmj capacity --reservoir`"
         )
     owner = model.site_bodyid[nodes]
     fixed = owner == 0

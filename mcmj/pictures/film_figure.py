@@ -28,6 +28,7 @@ Picture = npt.NDArray[np.uint8]
 DPI = 100  # only ratios of font sizes to pixels depend on it
 TRAIL = 3.0  # seconds of outputs drawn strongly in the portrait
 SMALL, LARGE = 8.5, 10.5  # points
+MOST_LABELS = 6  # of outputs in the legend
 
 
 class FilmFigure:
@@ -55,7 +56,7 @@ class FilmFigure:
         )
         words.text(0.17, 0.015, pace + film.scales, fontsize=LARGE)
         grid = self._figure.add_gridspec(
-            2, 1, left=share + 0.055, right=0.985, bottom=0.1, top=0.94, hspace=0.42,
+            2, 1, left=share + 0.062, right=0.99, bottom=0.1, top=0.94, hspace=0.42,
             height_ratios=(1.9, 1.0),
         )  # fmt: skip
         has_plane = film.outputs.shape[1] >= 2
@@ -135,7 +136,7 @@ class _Traces:
             axes.axvspan(window.start, window.end, color=CHANGE_COLOUR, alpha=0.15, lw=0)
         self._lines = [
             axes.plot([], [], color=OUTPUT_COLOURS[c % len(OUTPUT_COLOURS)], lw=1.1, animated=True,
-                      label=f"$x_{c + 1}$")[0]
+                      label=f"$x_{{{c + 1}}}$" if c < MOST_LABELS else None)[0]
             for c in range(film.outputs.shape[1])
         ]  # fmt: skip
         reach = 1.1 * float(np.abs(film.outputs).max(initial=0.0)) or 1.0

@@ -6,9 +6,11 @@ import numpy as np
 
 from mcmj.pictures.film import Film, ModelFilm
 from mcmj.pictures.rendering import ORBIT_POINTS, Report, Style, write_film
+from mcmj.pictures.video_file import OPTIONS
 from mcmj.simulation.reservoir import Reservoir
 from mcmj.simulation.simulation import Simulation
 from mcmj.targets.limit_cycles import Target
+from mcmj.targets.named import require_outputs
 from mcmj.utils.errors import InvalidArgumentError
 from mcmj.utils.validation import require_duration
 
@@ -34,6 +36,8 @@ def film_of(
     require_duration("seconds", seconds, reservoir.timestep)
     if reservoir.copies is not None:
         raise InvalidArgumentError("reservoir", "one without copies", reservoir.copies)
+    if target is not None:
+        require_outputs(reservoir, target, "reservoir")
     steps = round(seconds / reservoir.timestep)
     orbit = None if target is None else target.orbit(ORBIT_POINTS)
     if isinstance(reservoir, Simulation):
@@ -59,9 +63,12 @@ def film(
     """Write what a reservoir does next as .mp4 or .gif; see `film_of`.
 
     Raises:
+        InvalidArgumentError: neither .mp4 nor .gif.
         OutputError: the file cannot be written.
         RenderingUnavailableError: there is no OpenGL to draw a model that is no body.
     """
     file = Path(path)
+    if file.suffix not in OPTIONS:
+        raise InvalidArgumentError("path", f"a name that ends with {' or '.join(OPTIONS)}", path)
     recorded = film_of(reservoir, seconds, target=target, camera=camera)
     return write_film(recorded, {file.suffix: file}, style)

@@ -12,8 +12,9 @@ from mcmj.pictures.video_file import Picture
 from mcmj.utils.validation import Array
 
 BAND = 30  # pixels, above and below
-REACH = 2.3  # distance of the camera, over the size of what moves
+REACH = 2.6  # distance of the camera, over the size of what moves
 AZIMUTH, ELEVATION = 120.0, -20.0  # degrees
+BRIGHT = 0.5  # ambient light where a model has none of its own
 SHADOW = 1024  # pixels of the map: without shadows feet seem to float
 SEEN = 200  # samples that say where the camera goes
 
@@ -37,6 +38,10 @@ class ModelView:
         self._data = mujoco.MjData(self._model)
         self._model.vis.quality.offsamples = samples
         self._model.vis.quality.shadowsize = SHADOW
+        if self._model.nlight == 0:
+            self._model.vis.headlight.ambient[:] = BRIGHT
+        skies = self._model.tex_type == mujoco.mjtTexture.mjTEXTURE_SKYBOX
+        self._paint_white = not skies.any()
         self._picture = np.full((height, width, 3), 255, np.uint8)
         self._renderer = new_renderer(self._model, width, height - 2 * BAND)
         self._free = mujoco.MjvCamera()
@@ -56,7 +61,10 @@ class ModelView:
         _place(film, data, index)
         self._free.lookat[:] = self._start + index * self._speed
         self._renderer.update_scene(data, camera=film.camera or self._free)
-        self._picture[BAND:-BAND] = self._renderer.render()
+        shown = self._renderer.render()
+        if self._paint_white:  # what is behind everything is black
+            shown[(shown == 0).all(axis=-1)] = 255
+        self._picture[BAND:-BAND] = shown
         return self._picture
 
 

@@ -30,6 +30,8 @@ def new_video(
     suffix = Path(path).suffix
     if suffix not in OPTIONS:
         raise InvalidArgumentError("path", f"a name that ends with {' or '.join(OPTIONS)}", path)
+    if not Path(path).parent.is_dir():
+        raise OutputError(f"cannot write {path}: there is no folder {Path(path).parent}")
     mediapy.set_ffmpeg(imageio_ffmpeg.get_ffmpeg_exe())
     with whole_file(path) as temporary:
         try:

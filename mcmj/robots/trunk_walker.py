@@ -17,18 +17,19 @@ import numpy as np
 from mcmj.core.integrators import integrator_named
 from mcmj.core.trajectory import Trajectory
 from mcmj.mjcf.write import to_mjcf
+from mcmj.robots.ground import SQUARES, paint_squares
 from mcmj.robots.quadruped import GRAVITY
+from mcmj.robots.recorded_walk import record_walk
 from mcmj.robots.trunk import N_MUSCLES, Trunk
 from mcmj.robots.walk_metrics import Walk, fallen
-from mcmj.simulation.reservoir import CHUNK, Reservoir
+from mcmj.simulation.reservoir import Reservoir
 from mcmj.targets.gaits import LEGS
 from mcmj.utils.errors import InvalidArgumentError
-from mcmj.utils.validation import Array, require_number
+from mcmj.utils.validation import Array
 
 INTEGRATOR = "discrete"
 TIMESTEP = 1e-3  # s
 STAND = 2.0  # s until a robot that is let go stands still
-PUSH_DURATION = 0.1  # s
 SAMPLE = 0.01  # s, of a walk
 
 
@@ -61,21 +62,22 @@ def new_robot(
 def trunk_spec(
     trunk: Trunk, timestep: float, integrator: str, *, ground: bool = True
 ) -> mujoco.MjSpec:
-    """The model of a robot: actuator m<j> is muscle j; sensors load<i>, force<j>, velocity<j>."""
+    """The model of a robot: actuator m<j> is muscle j; sensors as recorded_walk asks for."""
     settings, n = trunk.settings, trunk.settings.nodes
     spec = mujoco.MjSpec.from_string(to_mjcf(trunk.body, timestep=timestep, integrator=integrator))
     spec.option.gravity = [0.0, -GRAVITY, 0.0]
     # contacts need constraints; a state that blew up is kept for the error message
     spec.option.disableflags = mujoco.mjtDisableBit.mjDSBL_AUTORESET.value
+    paint_squares(spec, 0.25, (0.97, 0.84))
     upright = [np.sqrt(0.5), -np.sqrt(0.5), 0.0, 0.0]
     spec.worldbody.add_geom(
         name="ground", type=mujoco.mjtGeom.mjGEOM_PLANE, size=[0, 0, 1], quat=upright,
-        pos=[0, -settings.foot, 0], contype=0, conaffinity=int(ground), material=_squares(spec),
+        pos=[0, -settings.foot, 0], contype=0, conaffinity=int(ground), material=SQUARES,
     )  # fmt: skip
     for i, leg in enumerate(LEGS):
-        _add_foot(spec, trunk, f"n{n + i}", leg, f"load{i}")
+        _add_foot(spec, trunk, f"n{n + i}", leg)
     strength, sensor = settings.muscle_strength, mujoco.mjtSensor
-    told = {"force": sensor.mjSENS_ACTUATORFRC, "velocity": sensor.mjSENS_ACTUATORVEL}
+    told = {"force": sensor.mjSENS_ACTUATORFRC, "speed": sensor.mjSENS_ACTUATORVEL}
     for j in range(N_MUSCLES):
         muscle = spec.add_actuator(
             name=f"m{j}", target=f"s{trunk.n_sensed + j}", trntype=mujoco.mjtTrn.mjTRN_TENDON,
@@ -84,12 +86,13 @@ def trunk_spec(
         muscle.gainprm[0] = settings.muscle_stiffness
         for name, what in told.items():
             spec.add_sensor(
-                name=f"{name}{j}", type=what, objtype=mujoco.mjtObj.mjOBJ_ACTUATOR, objname=f"m{j}"
-            )
+                name=f"m{j}_{name}", type=what, objtype=mujoco.mjtObj.mjOBJ_ACTUATOR,
+                objname=f"m{j}",
+            )  # fmt: skip
     return spec
 
 
-def _add_foot(spec: mujoco.MjSpec, trunk: Trunk, body: str, leg: str, load: str) -> None:
+def _add_foot(spec: mujoco.MjSpec, trunk: Trunk, body: str, leg: str) -> None:
     """A sphere that touches the ground, and a sensor of its load."""
     foot, size = spec.body(body), trunk.settings.foot
     foot.add_geom(
@@ -99,22 +102,9 @@ def _add_foot(spec: mujoco.MjSpec, trunk: Trunk, body: str, leg: str, load: str)
     )  # fmt: skip
     foot.add_site(name=leg, size=[1.1 * size, 0, 0], rgba=[0, 0, 0, 0])
     spec.add_sensor(
-        name=load, type=mujoco.mjtSensor.mjSENS_TOUCH,
+        name=f"{leg}_contact", type=mujoco.mjtSensor.mjSENS_TOUCH,
         objtype=mujoco.mjtObj.mjOBJ_SITE, objname=leg,
     )  # fmt: skip
-
-
-def _squares(spec: mujoco.MjSpec) -> str:
-    """A material for the ground, on which motion shows: squares of 0.25 m."""
-    spec.add_texture(
-        name="squares", type=mujoco.mjtTexture.mjTEXTURE_2D,
-        builtin=mujoco.mjtBuiltin.mjBUILTIN_CHECKER,
-        rgb1=[0.97, 0.97, 0.95], rgb2=[0.84, 0.86, 0.83], width=64, height=64,
-    )  # fmt: skip
-    textures = [""] * mujoco.mjtTextureRole.mjNTEXROLE
-    textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = "squares"
-    spec.add_material(name="squares", textures=textures, texrepeat=[4, 4], texuniform=True)
-    return "squares"
 
 
 def stand(robot: Reservoir) -> None:
@@ -126,44 +116,22 @@ def stand(robot: Reservoir) -> None:
 def walk(
     robot: Reservoir, trunk: Trunk, duration: float, *, push: float = 0.0, sample: float = SAMPLE
 ) -> Walk:
-    """Go on with the readout there is; outputs are the commands c [m].
+    """Go on with the readout there is; outputs are the commands c [m]. See record_walk.
 
     Args:
         duration: [s].
-        push: impulse forwards on the trunk [N s], a constant force on all of its nodes over the
-            first PUSH_DURATION.
-        sample: time between samples [s], rounded to whole steps.
+        push: impulse forwards on the trunk [N s], a constant force on all of its nodes.
+        sample: time between samples [s].
 
     Raises:
         DivergenceError: the robot blew up.
     """
-    require_number("duration", duration, 2 * sample)
-    stride = max(1, round(sample / robot.timestep))
-    total = round(duration / robot.timestep)
-    pushed = min(total, round(PUSH_DURATION / robot.timestep)) if push else 0
-    record, chunk = ("outputs", "qpos", "sensordata"), CHUNK // stride * stride
-    parts = []
-    if pushed:
-        force = push / (pushed * robot.timestep) / trunk.settings.nodes
-        forces = {f"n{i}": (force, 0.0, 0.0) for i in range(trunk.settings.nodes)}
-        parts.append(robot.rollout(pushed, forces=forces, record=record))
-    if total > pushed:
-        parts += robot.stream(total - pushed, record=record, chunk=chunk)
-    rows = {
-        name: np.concatenate([part.get(name)[::stride] for part in parts])[None] for name in record
-    }
-    sensors = {
-        name: rows["sensordata"][..., _places(robot, name, count)]
-        for name, count in (("load", len(LEGS)), ("force", N_MUSCLES), ("velocity", N_MUSCLES))
-    }
-    return Walk(
-        times=stride * robot.timestep * np.arange(rows["qpos"].shape[1], dtype=np.float64),
-        trunk=poses(trunk, rows["qpos"]),
-        outputs=rows["outputs"],
-        contact=sensors["load"],
-        power=np.maximum(sensors["force"] * sensors["velocity"], 0.0).sum(axis=-1),
-        joints=rows["qpos"],
-    )
+    n = trunk.settings.nodes
+    share = np.array([push / n, 0.0, 0.0])
+    return record_walk(
+        robot, duration, sample, lambda qpos: poses(trunk, qpos), n_outputs=N_MUSCLES, joints=True,
+        impulses={f"n{i}": share for i in range(n)} if push else None,
+    )  # fmt: skip
 
 
 def has_fallen(trunk: Trunk) -> Callable[[Trajectory], bool]:
@@ -183,8 +151,3 @@ def poses(trunk: Trunk, qpos: Array) -> Array:
     return np.stack(
         [middle[..., 0], zero, middle[..., 1], np.cos(half), zero, -np.sin(half), zero], axis=-1
     )
-
-
-def _places(robot: Reservoir, name: str, count: int) -> list[int]:
-    """Of sensors name0, name1, .. in sensordata."""
-    return [int(robot.model.sensor(f"{name}{i}").adr[0]) for i in range(count)]

@@ -20,6 +20,7 @@ import numpy as np
 from mcmj.core.body import Body
 from mcmj.core.callbacks.pointers import TAG
 from mcmj.mjcf.write import to_mjcf
+from mcmj.robots.ground import SQUARES, paint_squares
 from mcmj.robots.quadruped import GRAVITY, Quadruped, quadruped_mjcf
 from mcmj.targets.gaits import LEGS
 from mcmj.utils.errors import InvalidArgumentError
@@ -64,10 +65,10 @@ def walking_model(body: Body, robot: Quadruped, terrain: Terrain, bearing: float
     spec.option.disableflags = mujoco.mjtDisableBit.mjDSBL_AUTORESET.value
     half = terrain.slope / 2
     tilt = [np.cos(half), 0.0, -np.sin(half), 0.0]
-    _paint_squares(spec, robot.leg)
+    paint_squares(spec, robot.leg, (0.78, 0.71))
     spec.worldbody.add_geom(
         name="ground", type=mujoco.mjtGeom.mjGEOM_PLANE, size=[0, 0, 1], quat=tilt,
-        contype=0, conaffinity=1, material="squares", group=GROUND_GROUP,
+        contype=0, conaffinity=1, material=SQUARES, group=GROUND_GROUP,
     )  # fmt: skip
     beside = body.positions[:, 1].min() - 2 * robot.leg
     above = robot.standing_height * np.array([-np.sin(terrain.slope), 0.0, np.cos(terrain.slope)])
@@ -87,17 +88,3 @@ def _couple(spec: mujoco.MjSpec, robot: Quadruped, n_springs: int, bearing: floa
         actuator.biastype = mujoco.mjtBias.mjBIAS_USER
         actuator.biasprm[:5] = [1.0, TAG, n_springs, 2 * len(LEGS), 0.0]
         actuator.userdata = np.kron(np.eye(len(LEGS))[i], heard)
-
-
-def _paint_squares(spec: mujoco.MjSpec, side: float) -> None:
-    """A ground on which motion shows: squares as long as a leg [m]."""
-    spec.add_texture(
-        name="squares", type=mujoco.mjtTexture.mjTEXTURE_2D,
-        builtin=mujoco.mjtBuiltin.mjBUILTIN_CHECKER,
-        rgb1=[0.78, 0.78, 0.76], rgb2=[0.71, 0.72, 0.70], width=64, height=64,
-    )  # fmt: skip
-    textures = [""] * mujoco.mjtTextureRole.mjNTEXROLE
-    textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = "squares"
-    spec.add_material(
-        name="squares", textures=textures, texrepeat=[1 / side, 1 / side], texuniform=True
-    )

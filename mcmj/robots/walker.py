@@ -13,18 +13,15 @@ import numpy.typing as npt
 
 from mcmj.core.body import Body, require_plane
 from mcmj.core.integrators import DEFAULT_INTEGRATOR
-from mcmj.core.trajectory import Trajectory, join
 from mcmj.robots.leg_readouts import LegReadout
 from mcmj.robots.quadruped import GRAVITY, Quadruped
+from mcmj.robots.recorded_walk import record_walk
 from mcmj.robots.rescale import SIZE, rescaled
 from mcmj.robots.walk_metrics import Walk
 from mcmj.robots.walk_scene import ROBOT, TRUNK, Terrain, walking_model
 from mcmj.simulation.reservoir import Reservoir
 from mcmj.targets.gaits import LEGS
-from mcmj.utils.validation import MOST_STEPS, Array, as_array, require_count, require_number
-
-PUSH_DURATION = 0.1  # s
-CHUNK = 2048  # steps of all copies whose records are thinned at a time
+from mcmj.utils.validation import Array, as_array, require_number
 
 
 class Walker(Reservoir):
@@ -115,44 +112,13 @@ class Walker(Reservoir):
         Raises:
             DivergenceError: a copy blew up.
         """
-        require_number("sample", sample, 0.0, open_low=True)
-        every = max(1, round(sample / self.timestep))
-        count = round(duration / (every * self.timestep))
-        require_count("duration / sample", count, 1, MOST_STEPS)
-        pushed = 0 if push is None else min(count, round(PUSH_DURATION / (every * self.timestep)))
-        chunk = every * max(1, CHUNK // (every * (self.copies or 1)))
-        parts = []
-        for samples, impulse in ((pushed, push), (count - pushed, (0.0, 0.0))):
-            if impulse is not None and samples > 0:
-                lead = np.shape(impulse)[:-1]
-                force = np.zeros((*lead, 3))
-                force[..., :2] = as_array("push", impulse, (*lead, 2)) / PUSH_DURATION
-                run = self.stream(
-                    samples * every, forces={TRUNK: force},
-                    record=("outputs", "qpos", "sensordata"), chunk=chunk,
-                )  # fmt: skip
-                parts += [part.thinned(every) for part in run]
-        return self._walk_of(join(parts), every * self.timestep, joints)
-
-    def _walk_of(self, run: Trajectory, sample: float, joints: bool) -> Walk:
-        """Samples of a rollout, so far apart [s], as a walk."""
-        outputs, qpos, sensors = (
-            run.get(name).reshape(self.copies or 1, len(run), -1)
-            for name in ("outputs", "qpos", "sensordata")
-        )
-
-        def measured(ending: str) -> Array:
-            names = [self.model.sensor(i).name for i in range(self.model.nsensor)]
-            places = [self.model.sensor(n).adr[0] for n in names if n.endswith(ending)]
-            found: Array = sensors[..., places]
-            return found
-
-        power = np.maximum(measured("_force") * measured("_speed"), 0.0)
-        return Walk(
-            times=sample * np.arange(len(run), dtype=np.float64),
-            trunk=qpos[..., self._nodes : self._nodes + 7],
-            outputs=outputs[..., : len(LEGS)],
-            contact=measured("_contact"),
-            power=power.sum(axis=-1),
-            joints=qpos if joints else None,
-        )
+        impulses = None
+        if push is not None:
+            lead = (self.copies or 1,) if np.ndim(push) == 2 else ()
+            flat = as_array("push", push, (*lead, 2))
+            impulses = {TRUNK: np.concatenate([flat, np.zeros((*lead, 1))], axis=-1)}
+        first = self._nodes
+        return record_walk(
+            self, duration, sample, lambda qpos: qpos[..., first : first + 7],
+            impulses=impulses, joints=joints,
+        )  # fmt: skip

@@ -24,6 +24,7 @@ _CTRL = mujoco.mjtState.mjSTATE_CTRL.value
 _APPLIED = mujoco.mjtState.mjSTATE_QFRC_APPLIED.value
 _TIME = mujoco.mjtState.mjSTATE_TIME.value
 _NO_STAGE = mujoco.mjtStage.mjSTAGE_NONE.value
+MOST_CONTROL = mujoco.mjMAXVAL
 POSITION_STAGE = mujoco.mjtStage.mjSTAGE_POS.value
 
 
@@ -76,7 +77,10 @@ class BatchEngine:
         require_count("threads", threads, 1)
         self.model, self.timestep, self.substeps = model, timestep, substeps
         self.channels = channels
-        self.batch = Batch(model, copies, threads)
+        try:
+            self.batch = Batch(model, copies, threads)
+        except ValueError as error:  # what batches do not take, such as sleeping bodies
+            raise InvalidArgumentError("model", "one that MuJoCo's Batch takes", error) from error
         if threads > 1:
             guard_against_forks(self)
         self._views: dict[str, Array] = {}
@@ -208,7 +212,11 @@ class BatchEngine:
         )
 
     def _fastest(self, copy: int) -> str:
-        """What moves fastest in a copy, and how fast."""
+        """What moves fastest in a copy, and how fast; or a control that MuJoCo does not take."""
+        controls = np.abs(self.bound("ctrl")[copy])
+        if controls.max(initial=0.0) > MOST_CONTROL:
+            actuator = self.model.actuator(int(controls.argmax())).name
+            return f"actuator {actuator!r} (control {controls.max():.3g})"
         speeds = np.nan_to_num(np.abs(self.bound("qvel")[copy]), nan=np.inf)
         dof = int(speeds.argmax())
         joint = self.model.joint(int(self.model.dof_jntid[dof])).name

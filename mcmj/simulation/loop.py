@@ -36,6 +36,13 @@ class Loop(ABC):
     _driven = False  # a stream has begun and is not at its end
     _aliases: ClassVar[dict[str, str]] = {}  # what users call what is recorded
 
+    def __repr__(self) -> str:
+        copies = "" if self._copies is None else f", {self._copies} copies"
+        return (
+            f"{type(self).__name__}({self.n_signals} signals, {self.n_outputs} outputs, "
+            f"{self.n_inputs} inputs{copies}, at {self.time:g} s)"
+        )
+
     def _begin(self, engine: Engine, w_out: object, copies: int | None) -> None:
         self._engine, self._copies = engine, copies
         self.set_readout(w_out)
@@ -79,6 +86,15 @@ class Loop(ABC):
     def copies(self) -> int | None:
         """Number of copies; None: one, without an axis for it."""
         return self._copies
+
+    def _require_one(self) -> None:
+        """Raise if there are copies.
+
+        Raises:
+            InvalidArgumentError: there are.
+        """
+        if self._copies is not None:
+            raise InvalidArgumentError("reservoir", "one without copies", f"{self._copies}")
 
     @property
     def timestep(self) -> float:
@@ -154,8 +170,9 @@ class Loop(ABC):
         values = np.asarray(snapshot)
         if values.ndim != 2 or (values[:, -1:] != self._fingerprint).any():
             raise InvalidArgumentError(
-                "snapshot", f"one of {self._described()}", f"another, of shape {values.shape}"
-            )
+                "snapshot", f"one of {self._described()}",
+                f"that of another (shape {values.shape}); a file keeps six digits of a model",
+            )  # fmt: skip
         self._engine.restore(values[:, :-1])
 
     # --- stepping ----------------------------------------------------------------------------
@@ -212,7 +229,8 @@ class Loop(ABC):
             McmjError: another stream or rollout of this simulation begins before this one is at
                 its end or closed; also inside a hook.
         """
-        wanted = frozenset("signals" if name == "lengths" else name for name in record)
+        names = (record,) if isinstance(record, str) else record
+        wanted = frozenset("signals" if name == "lengths" else name for name in names)
         for name in wanted - {"outputs", *self._engine.recordable}:
             known = ["outputs", *self._engine.recordable]
             raise UnknownNameError("record", name, [self._aliases.get(n, n) for n in known])

@@ -9,10 +9,10 @@ import numpy as np
 from mcmj.core.callbacks import install
 from mcmj.core.rollout_arguments import Drive
 from mcmj.simulation.batch_engine import BatchEngine, Channels, shifted
-from mcmj.simulation.damage import alter_model
 from mcmj.simulation.models.adopt import AdoptedModel
+from mcmj.simulation.models.damage import alter_batch
 from mcmj.utils.errors import UnknownNameError
-from mcmj.utils.validation import Array, as_array
+from mcmj.utils.validation import Array, as_array, require_count
 
 _VELOCITY_STAGE = mujoco.mjtStage.mjSTAGE_VEL.value
 
@@ -30,10 +30,13 @@ class ModelEngine(BatchEngine):
     def __init__(self, adopted: AdoptedModel, *, copies: int, threads: int) -> None:
         install.install_control()
         self.adopted = adopted
-        # a state that blew up is kept for the error message
+        # a state that blew up is kept for the error message; with the flag, MuJoCo's sensor of the
+        # kinetic energy is a step late
         adopted.model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET.value
+        adopted.model.opt.enableflags &= ~mujoco.mjtEnableBit.mjENBL_ENERGY.value
         first, n_outputs = adopted.first, len(adopted.channel_names)
         dofs = np.arange(adopted.model.nv)
+        require_count("copies", copies, 1)
         self._kept = np.zeros((copies, len(adopted.kept)))
         channels = Channels(
             inputs=slice(first + n_outputs, first + n_outputs + len(adopted.input_names)),
@@ -60,7 +63,7 @@ class ModelEngine(BatchEngine):
         Raises:
             InvalidArgumentError, UnknownNameError: wrong shape, or no such body.
         """
-        names = [self.model.body(i).name for i in range(self.model.nbody)]
+        names = [self.model.body(i).name if i else "" for i in range(self.model.nbody)]
         found = np.zeros((self.copies, self.model.nbody, 6))
         for name, force in forces.items():
             if name not in names:
@@ -73,8 +76,8 @@ class ModelEngine(BatchEngine):
         return found
 
     def alter(self, cut: Sequence[str], masses: Mapping[str, float] | None) -> None:
-        """Tendons without force; masses [kg] of bodies, their inertia in proportion."""
-        alter_model(self.batch, self.model, cut, masses or {})
+        """Cut tendons, and masses [kg] of bodies; see mcmj.simulation.models.damage."""
+        alter_batch(self.batch, self.model, cut, masses or {})
 
     # --- state -------------------------------------------------------------------------------
 

@@ -13,9 +13,16 @@ from dataclasses import KW_ONLY, dataclass
 import numpy as np
 import numpy.typing as npt
 
+from mcmj.core.readout import Readout
 from mcmj.simulation.reservoir import Reservoir
 from mcmj.utils.errors import InvalidArgumentError
-from mcmj.utils.validation import as_array, require_count, require_duration, require_number
+from mcmj.utils.validation import (
+    as_array,
+    require_count,
+    require_duration,
+    require_name,
+    require_number,
+)
 
 
 @dataclass(frozen=True)
@@ -39,8 +46,8 @@ class Phase:
         duration: [s].
         gate: of the feedback channels, a number or (n_outputs,); default 1 with a readout.
         offset: (n_outputs,) constant, added to the fed-back outputs.
-        freeze: channels that go on feeding back what they fed back last; in a schedule's first
-            phase, the output of that moment. They take no offset.
+        freeze: channels, by number or name, that go on feeding back what they fed back last; in
+            a schedule's first phase, the output of that moment. They take no offset.
         forces: constant, as for a rollout: (n_forces,), or {body: (3,)} of a model; or
             RandomForces.
         length_noise: standard deviation of white noise, new every step, on the signals that
@@ -56,10 +63,10 @@ class Phase:
     _: KW_ONLY
     gate: npt.ArrayLike | None = None
     offset: npt.ArrayLike | None = None
-    freeze: tuple[int, ...] = ()
+    freeze: tuple[int | str, ...] = ()
     forces: npt.ArrayLike | Mapping[str, npt.ArrayLike] | RandomForces | None = None
     length_noise: float = 0.0
-    w_out: npt.ArrayLike | None = None
+    w_out: npt.ArrayLike | Readout | None = None
     cut: tuple[int, ...] | tuple[str, ...] = ()
     masses: npt.ArrayLike | Mapping[str, float] | None = None
     name: str = ""
@@ -70,15 +77,15 @@ class Phase:
         for name in ("freeze", "cut"):
             items = getattr(self, name)
             if not isinstance(items, Sequence) or isinstance(items, str):
-                raise InvalidArgumentError(name, "a tuple of numbers", repr(items))
+                raise InvalidArgumentError(name, "a tuple of numbers or names", repr(items))
             for item in items:
-                if name == "freeze" or not isinstance(item, str):
+                if not isinstance(item, str):
                     require_count(name, item, 0)
         for name in ("offset", "masses", "forces"):
             value = getattr(self, name)
             if value is not None and not isinstance(value, Mapping | RandomForces):
                 as_array(name, value, (None,))
-        if self.w_out is not None:
+        if self.w_out is not None and not isinstance(self.w_out, Readout):
             as_array("w_out", self.w_out, (None, None))
         if self.gate is not None:
             as_array("gate", np.atleast_1d(np.asarray(self.gate)), (None,))
@@ -134,9 +141,25 @@ class Schedule:
                 as_array("offset", phase.offset, (n_outputs,))
             if np.ndim(0.0 if phase.gate is None else phase.gate):
                 as_array("gate", phase.gate, (n_outputs,))
-            for channel in phase.freeze:
-                if channel >= n_outputs:
-                    raise InvalidArgumentError("freeze", f"channels 0 to {n_outputs - 1}", channel)
+            for channel in frozen_channels(reservoir, phase):
                 if phase.offset is not None and np.asarray(phase.offset)[channel] != 0.0:
                     raise InvalidArgumentError("offset", f"0 for the frozen channel {channel}",
                                                phase.offset)  # fmt: skip
+
+
+def frozen_channels(reservoir: Reservoir, phase: Phase) -> list[int]:
+    """Numbers of the channels that a phase freezes.
+
+    Raises:
+        InvalidArgumentError, UnknownNameError: one that the reservoir does not have.
+    """
+    found, names = [], reservoir.channel_names
+    for channel in phase.freeze:
+        if isinstance(channel, str):
+            require_name("channel", names, channel)
+            found.append(names.index(channel))
+        elif channel >= len(names):
+            raise InvalidArgumentError("freeze", f"channels 0 to {len(names) - 1}", channel)
+        else:
+            found.append(channel)
+    return found

@@ -17,12 +17,12 @@ import numpy as np
 import numpy.typing as npt
 
 from mcmj.simulation.batch_engine import BatchEngine
-from mcmj.simulation.damage import check_model_damage
 from mcmj.simulation.engines import Engine
 from mcmj.simulation.loop import CHUNK as CHUNK
 from mcmj.simulation.loop import Loop
 from mcmj.simulation.model_engine import ModelEngine
 from mcmj.simulation.models.adopt import Model, adopt, read_spec
+from mcmj.simulation.models.damage import check_damage
 from mcmj.simulation.models.names import Channels
 from mcmj.simulation.models.reservoir_file import read_reservoir, write_reservoir
 from mcmj.utils.errors import InvalidArgumentError
@@ -92,8 +92,7 @@ class Reservoir(Loop):
             InvalidArgumentError: it has copies already, an argument out of bounds, or `lenient`
                 with the compiled twin.
         """
-        if self._copies is not None:
-            raise InvalidArgumentError("reservoir", "one without copies", f"{self._copies}")
+        self._require_one()
         other = copy.copy(self)
         other._driven, other._alterations = False, ()
         other._begin(self._new_engine(copies, threads), self._w_out, copies)
@@ -117,18 +116,24 @@ class Reservoir(Loop):
         return cls(spec, **asked, w_out=w_out)
 
     def to_mjcf(self) -> str:
-        """The model as MJCF, with sensors, channels and readout: one file that is complete.
+        """The model as MJCF, as it was altered, with sensors, channels and readout.
 
         Without mcmj it is the model with an open loop; MuJoCo's own viewer shows it. The readout
-        is exact; the rest has the six digits that MuJoCo's writer keeps.
+        is exact; the rest has the six digits that MuJoCo's writer keeps. Meshes and textures stay
+        files of their own, named by their full paths.
+
+        Raises:
+            InvalidArgumentError: there are copies.
         """
-        return write_reservoir(self._adopted, None if self._w_out is None else self.readout)
+        self._require_one()
+        readout = None if self._w_out is None else self.readout
+        return write_reservoir(self._adopted, readout, self._alterations)
 
     # --- what it is --------------------------------------------------------------------------
 
     @property
     def model(self) -> mujoco.MjModel:
-        """MuJoCo's compiled model; readouts and gates of a rollout are not written to it.
+        """MuJoCo's compiled model, as it was before `alter`; without readouts and gates.
 
         Raises:
             InvalidArgumentError: the engine is not MuJoCo.
@@ -169,8 +174,7 @@ class Reservoir(Loop):
         """
         if not isinstance(self._engine, BatchEngine):
             raise InvalidArgumentError("engine", "'mujoco', which has a model", "'twin'")
-        if self._copies is not None:
-            raise InvalidArgumentError("reservoir", "one without copies", self._copies)
+        self._require_one()
         return self._engine
 
     # --- state -------------------------------------------------------------------------------
@@ -229,10 +233,12 @@ class Reservoir(Loop):
         Raises:
             InvalidArgumentError, UnknownNameError: no such tendon or body, or a wrong mass.
         """
-        check_model_damage(self.model, cut, masses or {})
+        check_damage(self.model, cut, masses)
 
     def alter(self, *, cut: Sequence[Any] = (), masses: Any = None) -> None:
         """Cut tendons by name and change masses [kg] of bodies, {name: mass}, for good.
+
+        See mcmj.simulation.models.damage. Snapshots of before are then of another reservoir.
 
         Raises:
             InvalidArgumentError, UnknownNameError: no such tendon or body, or a wrong mass.
@@ -240,13 +246,14 @@ class Reservoir(Loop):
         self.check_alteration(cut, masses)
         self._engine.alter(cut, masses)
         self._alterations += ((tuple(cut), copy.copy(masses)),)
+        self.__dict__.pop("_fingerprint", None)
 
     # --- inside ------------------------------------------------------------------------------
 
     def _identity(self) -> bytes:
         binary = np.zeros(mujoco.mj_sizeModel(self.model), np.uint8)
         mujoco.mj_saveModel(self.model, None, binary)
-        return binary.tobytes()
+        return binary.tobytes() + repr(self._alterations or "").encode()
 
     def _described(self) -> str:
         return "this model"

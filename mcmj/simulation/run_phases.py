@@ -6,12 +6,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from mcmj.core.trajectory import Trajectory, join
-from mcmj.simulation.phases import Phase, RandomForces, Schedule
+from mcmj.simulation.phases import Phase, RandomForces, Schedule, frozen_channels
 from mcmj.simulation.reservoir import CHUNK, Reservoir
 from mcmj.utils.errors import InvalidArgumentError
 from mcmj.utils.progress import OnSteps
 from mcmj.utils.seeds import stream
-from mcmj.utils.validation import Array
+from mcmj.utils.validation import Array, require_name
 
 
 @dataclass(frozen=True)
@@ -23,22 +23,33 @@ class ScheduleRun:
         feedback: (T, n_outputs), g y + o: what the channels really fed back (a feedback delay
             comes on top); a frozen output is constant here, a noisy one noisy.
         boundaries: (phases + 1,) indices: phase i is boundaries[i] .. boundaries[i + 1] - 1.
+        names: of the phases.
     """
 
     trajectory: Trajectory
     feedback: Array
     boundaries: tuple[int, ...]
+    names: tuple[str, ...] = ()
 
-    def phase(self, index: int) -> slice:
-        """Rows of a phase; counts from the end if negative."""
+    def phase(self, which: int | str) -> slice:
+        """Rows of a phase, by its name or number; counts from the end if negative.
+
+        Raises:
+            InvalidArgumentError, UnknownNameError: no such phase.
+        """
         n = len(self.boundaries) - 1
-        first = range(n)[index]
+        if isinstance(which, str):
+            require_name("phase", self.names, which)
+            which = self.names.index(which)
+        if not -n <= which < n:
+            raise InvalidArgumentError("phase", f"a name, or a number from 0 to {n - 1}", which)
+        first = range(n)[which]
         return slice(self.boundaries[first], self.boundaries[first + 1])
 
 
 def run_schedule(
     simulation: Reservoir,
-    schedule: Schedule,
+    schedule: Schedule | Sequence[Phase],
     seed: int,
     *,
     record: Sequence[str] = ("outputs",),
@@ -49,6 +60,7 @@ def run_schedule(
     Readouts, cut springs and masses stay as the last phase left them.
 
     Args:
+        schedule: a Schedule, or its phases.
         seed: of random forces and noise.
         record: as for a rollout; outputs always are.
         on_steps: called with the number of steps done after every chunk, for progress bars.
@@ -59,6 +71,7 @@ def run_schedule(
     """
     if simulation.copies is not None:
         raise InvalidArgumentError("simulation", "one without copies", f"{simulation.copies}")
+    schedule = schedule if isinstance(schedule, Schedule) else Schedule(schedule)
     schedule.check(simulation)
     forces, noise = stream(seed, "schedule_forces"), stream(seed, "schedule_noise")
     counts = schedule.steps(simulation.timestep)
@@ -75,7 +88,8 @@ def run_schedule(
             feedback.append(pushed)
             on_steps(len(part))
     boundaries = tuple(int(n) for n in np.cumsum([0, *counts]))
-    return ScheduleRun(join(parts), np.concatenate(feedback), boundaries)
+    names = tuple(phase.name for phase in schedule.phases)
+    return ScheduleRun(join(parts), np.concatenate(feedback), boundaries, names)
 
 
 def _run_phase(
@@ -116,7 +130,7 @@ def _gate_and_offset(
     if phase.offset is not None:
         offset[:] = phase.offset
     if phase.freeze:
-        frozen = list(phase.freeze)
+        frozen = frozen_channels(simulation, phase)
         held = simulation.readout.outputs(simulation.signals) if last is None else last
         gate[frozen], offset[frozen] = 0.0, held[frozen]
     return gate, offset

@@ -128,7 +128,14 @@ class Simulation(Reservoir):
         return self.body.n_forces
 
     def to_mjcf(self) -> str:
-        """The body as MJCF with its readout, to the last bit; see mcmj.to_mjcf."""
+        """The body as MJCF with its readout, to the last bit; see mcmj.to_mjcf.
+
+        Raises:
+            InvalidArgumentError: it was altered, which no body file says; or there are copies.
+        """
+        self._require_one()
+        if self._alterations:
+            raise InvalidArgumentError("simulation", "one that was not altered", "cuts or masses")
         return to_mjcf(
             self.body,
             timestep=self.options.physics_step,
@@ -173,6 +180,7 @@ class Simulation(Reservoir):
         weights = None if masses is None else checked_masses(self.body, masses)
         self._engine.alter(checked_cut(self.body, cut), weights)
         self._alterations += ((tuple(cut), weights),)
+        self.__dict__.pop("_fingerprint", None)
 
     @property
     def state(self) -> State:
@@ -203,6 +211,8 @@ class Simulation(Reservoir):
                 continue  # snapshots are those of bodies before they had one
             array = getattr(self.body, field.name)
             parts.append(repr(array.shape).encode() + array.tobytes())
+        for cut, masses in self._alterations:
+            parts.append(repr(cut).encode() + (b"" if masses is None else masses.tobytes()))
         return b"".join(parts)
 
     def _described(self) -> str:

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from mcmj.core.body import Body
+from mcmj.core.rollout_arguments import Driven
 from mcmj.targets.gaits import GAITS, gait_target
 from mcmj.targets.limit_cycles import TARGETS, Target, from_array, target
 from mcmj.utils.errors import InvalidArgumentError, UnknownNameError
@@ -47,11 +47,15 @@ def named_target(task: str, *others: str) -> Target:
     raise UnknownNameError("task", task, [*NAMES, *others, *OWN])
 
 
-def require_outputs(body: Body, wanted: Target) -> None:
-    """Raise InvalidArgumentError unless a body has as many outputs as a target."""
+def require_outputs(body: Driven, wanted: Target, name: str = "body") -> None:
+    """Raise InvalidArgumentError unless a body or reservoir has as many outputs as a target."""
+    if not isinstance(wanted, Target):
+        raise InvalidArgumentError(
+            "target", "a Target, such as mcmj.target('van_der_pol')", repr(wanted)
+        )
     if body.n_outputs != wanted.n_outputs:
         raise InvalidArgumentError(
-            "body", f"{wanted.n_outputs} feedback channels for {wanted.name}", body.n_outputs
+            name, f"{wanted.n_outputs} feedback channels for {wanted.name}", body.n_outputs
         )
 
 

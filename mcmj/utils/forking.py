@@ -21,15 +21,15 @@ class _Lost:
 
 
 def guard_against_forks(engine: Any) -> None:
-    """From now on, a forked child that uses this engine's `_batch` gets an error, not a hang."""
+    """From now on, a forked child that uses this engine's `batch` gets an error, not a hang."""
     _threaded.add(engine)
 
 
 def _lose_batches() -> None:
     for engine in list(_threaded):
         # never freed: its destructor, too, would wait for the threads
-        ctypes.pythonapi.Py_IncRef(ctypes.py_object(engine._batch))
-        engine._batch = _Lost()
+        ctypes.pythonapi.Py_IncRef(ctypes.py_object(engine.batch))
+        engine.batch = _Lost()
 
 
 if hasattr(os, "register_at_fork"):  # not on Windows, which has no fork

@@ -170,7 +170,7 @@ def test_what_does_not_fit_is_said(one):
         Setting(actions="forces")
     with pytest.raises(InvalidArgumentError, match="actions: expected channels"):
         environment.load("quadratic", setting=Setting(actions="inputs"))
-    with pytest.raises(InvalidArgumentError, match="reservoir: expected 4 outputs, got 2"):
+    with pytest.raises(InvalidArgumentError, match="reservoir: expected 4 feedback"):
         environment.make(one.physics.reservoir, named_target("trot"))
     simulation, goal = one.physics.reservoir, mcmj.target("lissajous")
     with pytest.raises(InvalidArgumentError, match="control_timestep: expected a multiple of"):
@@ -211,3 +211,18 @@ def test_the_cross_entropy_method_finds_better_inputs():
     assert result.rewards.shape == (2, 4)
     assert result.after.mean_reward == result.rewards.max()  # deterministic: played again
     assert result.after.mean_reward > result.before.mean_reward
+
+
+def test_a_reservoirs_file_is_an_environment(tmp_path):
+    w_out = np.random.default_rng(0).normal(size=(5, 2)) / 50
+    reservoir = mcmj.Reservoir(CHAIN, **CHAIN_PARTS, w_out=w_out)
+    (tmp_path / "chain.xml").write_text(reservoir.to_mjcf())
+    again = mcmj.Reservoir.open(tmp_path / "chain.xml")
+    goal = mcmj.target("lissajous")
+    env = environment.make(again, goal, Setting(kick=0.0, time_limit=1.0))
+    actions = 0.1 * actions_of(env, 20)
+    steps = [env.reset(), *(env.step(action) for action in actions)]
+    run = reservoir.rollout(offset=np.repeat(actions, 10, axis=0))
+    seen = np.array([step.observation["outputs"] for step in steps[:-1]])
+    assert np.abs(seen - run.outputs[::10]).max() < 1e-14
+    assert np.abs(seen).max() > 1e-3

@@ -209,5 +209,5 @@ def test_bad_settings_are_named(name, value):
 
 def test_a_target_of_another_dimension_is_refused(body):
     goal = from_array("sine", np.sin(2 * np.pi * np.arange(64)[:, None] / 64), 0.05)
-    with pytest.raises(InvalidArgumentError, match="expected shape"):
+    with pytest.raises(InvalidArgumentError, match="expected 1 feedback channels for sine"):
         teach(Simulation(body), goal, BRIEF, 0)

@@ -311,6 +311,6 @@ def test_errors_name_the_argument(body):
         Quadruped(leg=-1.0)
     with pytest.raises(InvalidArgumentError, match="body: expected 4 feedback channels"):
         Walker(replace(body, w_fb=body.w_fb[:, :2]), ROBOT)
-    for push, name in (((1.0, 2.0, 3.0), "push"), (np.zeros((3, 2)), "forces on robot/trunk")):
+    for push, name in (((1.0, 2.0, 3.0), "push"), (np.zeros((3, 2)), "push")):
         with pytest.raises(InvalidArgumentError, match=f"{name}: expected"):
             Walker(body, ROBOT).walk(0.1, push=push)

@@ -96,7 +96,8 @@ def find_cycle(
             return cycle
     raise McmjError(
         f"no settled cycle after {rounds * settle:g} s: the state misses itself by "
-        f"{cycle.residual:.2g} of its excursion after a period of {cycle.period:.5g} s"
+        f"{cycle.residual:.2g} of its excursion after a period of {cycle.period:.5g} s; let it "
+        f"settle for longer than {rounds} x {settle:g} s, or allow more than {tolerance:g}"
     )
 
 

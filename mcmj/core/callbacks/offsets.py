@@ -101,13 +101,15 @@ def _ctype(node: object) -> type:
 @functools.cache
 def _verified_layout(struct: str) -> type[ctypes.Structure]:
     """The layout, after one pointer of each struct was found where the bindings have it."""
-    model = mujoco.MjModel.from_xml_string(
+    # not MjModel.from_xml_string: the last model that it made, MuJoCo can write, and it is a user's
+    spec = mujoco.MjSpec.from_string(
         "<mujoco><worldbody><site name='a'/><body><inertial mass='1' pos='0 0 0' "
         "diaginertia='1 1 1'/><joint type='slide'/><site name='b' pos='1 0 0'/></body></worldbody>"
         "<tendon><spatial name='t'><site site='a'/><site site='b'/></spatial></tendon>"
         "<actuator><motor tendon='t' user='1'/></actuator>"
         "<sensor><tendonpos tendon='t'/></sensor></mujoco>"
     )
+    model = spec.compile()
     owner, array = {
         "mjModel": (model, model.actuator_user),
         "mjData": (data := mujoco.MjData(model), data.sensordata),

@@ -3,7 +3,6 @@
 from collections.abc import Callable
 from typing import Any
 
-import numpy as np
 from llvmlite import ir
 from numba import extending, int64, njit, types
 
@@ -107,5 +106,5 @@ def find_numeric(model, at, tag, least):
 
 @njit(cache=True)
 def whole(value, end):
-    """A number of a model if it is a whole one from 0 to end - 1, else -1; NaN is not."""
-    return int64(value) if 0.0 <= value < end and value == np.floor(value) else -1
+    """The whole part of a number of a model if it is from 0 to end - 1, else -1; NaN is not."""
+    return int64(value) if 0.0 <= value < end else -1

@@ -103,7 +103,8 @@ class Built:
     def largest_control(self, outputs: Array) -> float:
         """Of any actuator under outputs (T, n_outputs), over its limit on that side."""
         controls = outputs @ self.gains.T
-        return float(np.maximum(controls / self.limits[1], controls / self.limits[0]).max())
+        over = np.maximum(controls / self.limits[1], controls / self.limits[0])
+        return max(0.0, float(over.max()))
 
 
 def build(adoption: Adoption, target: Target, radius: float) -> Built:

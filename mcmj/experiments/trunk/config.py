@@ -3,8 +3,8 @@
 from dataclasses import dataclass, field
 
 from mcmj.learning.force_learning import ForceLearning
+from mcmj.robots.recorded_walk import PUSH_DURATION
 from mcmj.robots.trunk import TrunkSettings
-from mcmj.robots.trunk_walker import PUSH_DURATION
 from mcmj.targets.gaits import GAITS
 from mcmj.utils.errors import InvalidArgumentError
 from mcmj.utils.validation import (

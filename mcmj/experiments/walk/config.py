@@ -6,7 +6,7 @@ from itertools import permutations
 from mcmj.core.body import Body
 from mcmj.mjcf.bundled import open_body
 from mcmj.robots.quadruped import Quadruped
-from mcmj.robots.walker import PUSH_DURATION
+from mcmj.robots.recorded_walk import PUSH_DURATION
 from mcmj.targets.gaits import GAITS, LEGS
 from mcmj.utils.errors import InvalidArgumentError, UnknownNameError
 from mcmj.utils.validation import (

@@ -18,6 +18,7 @@ from mcmj.metrics.orbit_window import OrbitWindow
 from mcmj.simulation.reservoir import Reservoir
 from mcmj.simulation.simulation import Simulation
 from mcmj.targets.limit_cycles import Target
+from mcmj.targets.named import require_outputs
 from mcmj.utils.errors import InvalidArgumentError
 from mcmj.utils.extras import extra
 from mcmj.utils.validation import Array, as_array
@@ -211,8 +212,7 @@ def make(
     setting = setting or Setting()
     if isinstance(reservoir, Simulation):
         reservoir = reservoir.with_tendons()  # springs that are seen
-    if reservoir.n_outputs != target.n_outputs:
-        raise InvalidArgumentError("reservoir", f"{target.n_outputs} outputs", reservoir.n_outputs)
+    require_outputs(reservoir, target, "reservoir")
     setting.check_step(reservoir.timestep)
     constant = np.zeros(reservoir.n_inputs) if inputs is None else inputs
     held = as_array("inputs", constant, (reservoir.n_inputs,))

@@ -48,7 +48,8 @@ def require_screen() -> None:
         display = os.environ.get("DISPLAY")
         raise NoDisplayError(
             f"the viewer cannot open a window (DISPLAY is {display or 'not set'}); without a "
-            "screen, `mcmj render` makes films, or: apt-get install xvfb; xvfb-run -a .."
+            "screen, mcmj.film(..) or `mcmj render` make films, or: apt-get install xvfb; "
+            "xvfb-run -a .."
         )
 
 

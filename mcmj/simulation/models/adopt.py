@@ -17,7 +17,12 @@ import numpy.typing as npt
 from mcmj.core.callbacks.reservoir_law import NUMERIC, Law, block
 from mcmj.core.integrators import integrator_named
 from mcmj.simulation.models.compiled import spec_of_compiled, take_numbers
-from mcmj.simulation.models.names import Channels, resolved_channels, resolved_sensors
+from mcmj.simulation.models.names import (
+    Channels,
+    name_what_has_no_name,
+    resolved_channels,
+    resolved_sensors,
+)
 from mcmj.utils.errors import BodyFileError, InvalidArgumentError
 from mcmj.utils.quiet import quiet_warnings
 from mcmj.utils.validation import require_count, require_number
@@ -25,6 +30,8 @@ from mcmj.utils.validation import require_count, require_number
 Model: TypeAlias = str | PathLike[str] | mujoco.MjSpec | mujoco.MjModel
 
 OURS = "mcmj:"  # begins the names of what is added
+CLOCK = f"{OURS}time"  # a sensor
+_OWN = ("name", "id", "info", "signature", "compiler", "classname", "plugin")  # of an element
 _COPIED = (
     "type",
     "objtype",
@@ -84,7 +91,10 @@ def read_spec(
         require_number("timestep", timestep, 0.0, open_low=True)
         spec.option.timestep = timestep
     if integrator is not None:
-        name = integrator_named(integrator).mujoco_name
+        chosen = integrator_named(integrator)
+        if chosen.by_callback:
+            raise InvalidArgumentError("integrator", "one of MuJoCo's, for any model", integrator)
+        name = chosen.mujoco_name
         spec.option.integrator = getattr(mujoco.mjtIntegrator, f"mjINT_{name.upper()}")
     return spec
 
@@ -94,6 +104,11 @@ def _copied(model: Model) -> mujoco.MjSpec:
         return model.copy()
     if isinstance(model, mujoco.MjModel):
         return spec_of_compiled(model)
+    if not isinstance(model, str | PathLike) or not str(model):
+        raise InvalidArgumentError(
+            "model", "MJCF (a path or a string), an MjSpec or an MjModel (dm_control's "
+            "physics.model.ptr is one)", repr(model)
+        )  # fmt: skip
     try:
         with quiet_warnings():
             if isinstance(model, str) and model.lstrip().startswith("<"):
@@ -123,6 +138,8 @@ def adopt(
             that the model does not have.
     """
     require_count("feedback_delay", feedback_delay, 0)
+    _check(spec)
+    name_what_has_no_name(spec)
     heard = resolved_sensors(spec, sensors)
     outputs = resolved_channels(spec, "channel", channels)
     if not outputs:
@@ -134,6 +151,18 @@ def adopt(
     return found
 
 
+def _check(spec: mujoco.MjSpec) -> None:
+    """Raise unless the channels can be added."""
+    elements = (*spec.sensors, *spec.actuators, *spec.numerics)
+    ours = [element.name for element in elements if element.name.startswith((OURS, NUMERIC))]
+    if ours:
+        raise InvalidArgumentError(
+            "model", f"one that is no reservoir yet: no name that begins with {OURS!r}", ours[0]
+        )
+    if spec.option.disableflags & mujoco.mjtDisableBit.mjDSBL_SENSOR.value:
+        raise InvalidArgumentError("model", "sensors that are on", '<flag sensor="disable"/>')
+
+
 def _with_channels(
     spec: mujoco.MjSpec,
     heard: list[str],
@@ -141,31 +170,13 @@ def _with_channels(
     inputs: dict[str, dict[str, float]],
     feedback_delay: int,
 ) -> AdoptedModel:
-    if NUMERIC in [numeric.name for numeric in spec.numerics]:
-        raise InvalidArgumentError("model", "one that is not a reservoir yet", NUMERIC)
-    spec.add_sensor(name=f"{OURS}time", type=mujoco.mjtSensor.mjSENS_CLOCK)
-    bare = _compiled(spec)
-    actuators = {bare.actuator(a).name: a for a in range(bare.nu)}
+    spec.add_sensor(name=CLOCK, type=mujoco.mjtSensor.mjSENS_CLOCK)
     law_reads = heard if feedback_delay == 0 else _delayed(spec, heard, feedback_delay)
-    signals, signal_names, late = _addresses(_compiled(spec), heard)
-    read = _addresses(_compiled(spec), law_reads)[0].tolist()
-    slow = [place for place, is_late in zip(read, late, strict=True) if is_late]
-    law_drives = [
-        (actuators[name], channel, gain)
-        for channel, gains in enumerate([*outputs.values(), *inputs.values()])
-        for name, gain in gains.items()
-    ]
-    law = Law(
-        outputs=len(outputs),
-        first=bare.nu,
-        clock=int(bare.sensor(f"{OURS}time").adr[0]),
-        signals=len(read),
-        late=len(slow),
-        drives=len(law_drives),
-        memory=bare.nuserdata,
-    )
+    bare = _compiled(spec)
+    signals, signal_names, late = _addresses(bare, heard)
+    read = _addresses(bare, law_reads)[0]
     delay = max(0.0, feedback_delay - 0.5) * spec.option.timestep
-    numbers = block(law, read, slow, law_drives, delay)
+    numbers = _law_block(bare, outputs, inputs, read, read[late], delay)
     spec.nuserdata = bare.nuserdata + (1 + int(late.sum()) if late.any() else 0)
     spec.nuser_actuator = max(bare.nuser_actuator, len(signals) + 1)
     for kind, name in [*(("output", n) for n in outputs), *(("input", n) for n in inputs)]:
@@ -188,20 +199,46 @@ def _with_channels(
         input_names=tuple(inputs),
         first=bare.nu,
         memory=bare.nuserdata,
-        kept=np.array([*slow, *(signals[late] if feedback_delay else ())], np.int64),
+        kept=np.array([*read[late], *(signals[late] if feedback_delay else ())], np.int64),
     )
+
+
+def _law_block(
+    bare: mujoco.MjModel,
+    outputs: dict[str, dict[str, float]],
+    inputs: dict[str, dict[str, float]],
+    read: npt.NDArray[np.int64],
+    late: npt.NDArray[np.int64],
+    delay: float,
+) -> list[float]:
+    """The law's numbers for a model without its channels, see reservoir_law.block."""
+    drives = [
+        (bare.actuator(name).id, channel, gain)
+        for channel, gains in enumerate([*outputs.values(), *inputs.values()])
+        for name, gain in gains.items()
+    ]
+    law = Law(
+        outputs=len(outputs),
+        first=bare.nu,
+        clock=int(bare.sensor(CLOCK).adr[0]),
+        signals=len(read),
+        late=len(late),
+        drives=len(drives),
+        memory=bare.nuserdata,
+    )
+    return block(law, read.tolist(), late.tolist(), drives, delay)
 
 
 def _add_channel(spec: mujoco.MjSpec, name: str, width: int) -> None:
     """An actuator without force, on what the first actuator moves; no default of the model's."""
-    like, no = spec.actuators[0], mujoco.mjtLimited.mjLIMITED_FALSE.value
-    spec.add_actuator(
-        name=name, trntype=like.trntype, target=like.target, refsite=like.refsite,
-        slidersite=like.slidersite, cranklength=like.cranklength, inheritrange=0.0,
-        ctrllimited=no, forcelimited=no, actlimited=no, dyntype=mujoco.mjtDyn.mjDYN_NONE,
-        gaintype=mujoco.mjtGain.mjGAIN_FIXED, gainprm=np.zeros(10), delay=0.0, nsample=0,
-        biastype=mujoco.mjtBias.mjBIAS_NONE, biasprm=np.zeros(10), userdata=np.zeros(width),
-    )  # fmt: skip
+    like, channel = spec.actuators[0], spec.add_actuator(name=name)
+    plain = mujoco.MjSpec().add_actuator()
+    for field in dir(plain):
+        if not field.startswith(("_", "set_")) and field not in _OWN:
+            setattr(channel, field, getattr(plain, field))
+    for field in ("trntype", "target", "refsite", "slidersite", "cranklength"):
+        setattr(channel, field, getattr(like, field))
+    channel.gainprm, channel.userdata = np.zeros(len(plain.gainprm)), np.zeros(width)
 
 
 def _delayed(spec: mujoco.MjSpec, heard: list[str], steps: int) -> list[str]:
@@ -209,6 +246,10 @@ def _delayed(spec: mujoco.MjSpec, heard: list[str], steps: int) -> list[str]:
     step, names = spec.option.timestep, []
     for name in heard:
         sensor = spec.sensor(name)
+        if sensor.nsample or sensor.delay or np.any(sensor.interval):
+            raise InvalidArgumentError(
+                "feedback_delay", "0 with a sensor that has a delay or interval of its own", name
+            )
         values: dict[str, Any] = {field: getattr(sensor, field) for field in _COPIED}
         names.append(f"{OURS}late:{name}")
         spec.add_sensor(name=names[-1], delay=(steps - 0.5) * step, nsample=steps + 1, **values)

@@ -5,6 +5,7 @@ was asked for, and holds the readout exactly. MuJoCo's writer keeps six digits o
 """
 
 import json
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +15,7 @@ import numpy as np
 from mcmj.core.callbacks.reservoir_law import NUMERIC
 from mcmj.core.readout import Readout
 from mcmj.simulation.models.adopt import OURS, AdoptedModel, Model, read_spec
+from mcmj.simulation.models.damage import write_damage
 from mcmj.utils.errors import BodyFileError
 from mcmj.utils.quiet import quiet_warnings
 from mcmj.utils.validation import Array
@@ -21,9 +23,22 @@ from mcmj.utils.validation import Array
 SETTINGS = "mcmj_reservoir_settings"  # the custom text
 
 
-def write_reservoir(adopted: AdoptedModel, readout: Readout | None) -> str:
-    """MJCF of a model with its channels and, if there is one, its readout, its loop closed."""
+def write_reservoir(
+    adopted: AdoptedModel,
+    readout: Readout | None,
+    alterations: Sequence[tuple[Sequence[str], Mapping[str, float] | None]] = (),
+) -> str:
+    """MJCF of a model with its channels and, if there is one, its readout, its loop closed.
+
+    Args:
+        alterations: tendons cut and masses [kg] of bodies, see mcmj.simulation.damage.
+    """
     spec = adopted.spec.copy()
+    if adopted.spec.modelfiledir:  # meshes and textures are found from any folder
+        folder = Path(adopted.spec.modelfiledir).absolute()
+        spec.meshdir, spec.texturedir = str(folder / spec.meshdir), str(folder / spec.texturedir)
+    for cut, masses in alterations:
+        write_damage(spec, adopted.model, cut, masses or {})
     kept = None if readout is None else readout.rows.tolist()
     spec.add_text(name=SETTINGS, data=json.dumps({**adopted.asked, "w_out": kept}))
     for c, name in enumerate(adopted.channel_names if readout else ()):
@@ -63,8 +78,14 @@ def read_reservoir(model: Model) -> tuple[mujoco.MjSpec, dict[str, Any], Array |
             raise ValueError("its settings do not fit")
         added = [texts[SETTINGS], numbers[NUMERIC]]
     except (KeyError, ValueError, TypeError, AttributeError) as error:
-        raise BodyFileError(f"model: not the file of a reservoir ({error})") from error
+        raise BodyFileError(
+            f"model: not the file of a reservoir ({error}): mcmj.Reservoir(model, sensors=.., "
+            "channels=..) makes one of any model, and its to_mjcf() the file"
+        ) from error
     added += [one for one in (*spec.actuators, *spec.sensors) if one.name.startswith(OURS)]
     for element in added:
         spec.delete(element)
+    for key in spec.keys:
+        if len(key.ctrl):
+            key.ctrl = list(key.ctrl)[: len(spec.actuators)]
     return spec, asked, w_out
