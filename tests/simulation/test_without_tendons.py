@@ -180,6 +180,15 @@ def test_energy_is_that_of_a_body_without_dampers():
     assert np.ptp(potential + kinetic) < 1e-11 * kinetic[0]
 
 
+@pytest.mark.parametrize("kind", BODIES)
+@pytest.mark.parametrize("integrator", SCHEMES)
+def test_what_is_at_rest_stays_at_rest_to_the_bit(kind, integrator):
+    body = body_of(kind)
+    run = Simulation(body, integrator=integrator).rollout(500, record=("lengths", "positions"))
+    assert np.array_equal(run.lengths, np.tile(body.rest_lengths, (500, 1)))
+    assert np.array_equal(run.positions[-1], body.positions)
+
+
 def test_lengths_follow_the_twin_in_plain_mj_step(body):
     """Whoever steps the model under the callbacks gets lengths before the step."""
     simulation = Simulation(body)

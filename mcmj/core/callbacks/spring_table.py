@@ -120,9 +120,9 @@ def spans(table, places, out):
             out[2 * count + j] = places[2 * n + int64(b[j])] - places[2 * n + int64(a[j])]
 
 
-@njit(cache=True)
+@njit(cache=True, fastmath=False)  # else it takes its callers'
 def lengths_of(table, differences, out):
-    """Lengths (L,) from dx, dy, dz (3, L)."""
+    """Lengths (L,) from dx, dy, dz (3, L), rounded as NumPy's, so that what is at rest stays so."""
     n = table.springs
     for j in range(n):
         dx, dy, dz = differences[j], differences[n + j], differences[2 * n + j]
