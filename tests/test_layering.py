@@ -52,16 +52,18 @@ MOST_MODULES, MOST_ROOT_ENTRIES = 14, 16
 MUJOCO = {
     "analysis.loops.chart",
     "core.callbacks.install",
-    "core.callbacks.library",
     "core.callbacks.offsets",
     "experiments.adopt.suite_models",
     "experiments.benchmark.full_scene",
+    "experiments.benchmark.lean",
     "experiments.benchmark.models",
     "experiments.benchmark.run",
     "experiments.limit_cycle.loop_cost",  # times bare mj_step
     "learning.environments.environment",
+    "mjcf.body_model",
     "mjcf.check",
     "mjcf.read",
+    "mjcf.without_tendons",
     "pictures.opengl",
     "pictures.opengl_view",
     "pictures.trunk_video",
@@ -138,7 +140,7 @@ def folder(name):
 
 
 def test_the_graph_is_read():
-    assert {"mjcf.write", "mjcf.read"} <= GRAPH["simulation.body_engine"]
+    assert {"mjcf.write", "mjcf.read"} <= GRAPH["mjcf.body_model"]
     assert "numpy" in outside("core.body")
     assert len(MODULES) > 150
 

@@ -7,7 +7,8 @@ from mcmj.core.integrators import DEFAULT_INTEGRATOR, TWINNED, integrator_named
 from mcmj.utils.errors import InvalidArgumentError, UnknownNameError
 from mcmj.utils.validation import require_count, require_timestep
 
-ENGINES = ("mujoco", "twin")
+TENDONS = "tendons"  # MuJoCo, with the tendons of the body's file
+ENGINES = ("mujoco", TENDONS, "twin")
 
 
 @dataclass(frozen=True)

@@ -17,7 +17,7 @@ from mcmj.core.callbacks import install
 from mcmj.core.rollout_arguments import Drive
 from mcmj.utils.errors import DivergenceError, InvalidArgumentError
 from mcmj.utils.forking import guard_against_forks
-from mcmj.utils.quiet import quiet_warnings
+from mcmj.utils.quiet import quiet_warnings, untimed
 from mcmj.utils.validation import Array, require_count
 
 _CTRL = mujoco.mjtState.mjSTATE_CTRL.value
@@ -60,6 +60,7 @@ class BatchEngine:
     advice = "try a smaller step, another integrator, or smaller outputs"
     _lenient = False  # copies that blow up are no errors
     _passive = False  # whether mcmj's callback makes passive forces
+    _sensors = False  # whether mcmj's callback measures lengths
     _stage = POSITION_STAGE  # up to which sensors are of use
 
     def __init__(
@@ -153,7 +154,7 @@ class BatchEngine:
 
     def install(self) -> None:
         """Callbacks again: somebody may have taken them out since the last chunk."""
-        install.install(passive=self._passive)
+        install.install(passive=self._passive, sensors=self._sensors)
 
     def _advance(self, drive: Drive, start: int, stop: int, fields: list[str]) -> dict[str, Array]:
         """Fields (copies, steps, n) after each physics step of control steps start .. stop - 1."""
@@ -161,7 +162,7 @@ class BatchEngine:
         steps = (stop - start) * self.substeps
         control, spec = self._control(drive, start, stop)
         before = self.bound("time").copy()
-        with quiet_warnings():
+        with untimed():
             rows: dict[str, Array] = self.batch.rollout(steps, control, spec, fields or [_TIME])
         self._check_alive(before, steps)
         self.steps_done += stop - start

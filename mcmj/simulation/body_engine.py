@@ -5,17 +5,16 @@ from collections.abc import Sequence
 import numpy as np
 
 from mcmj.core.body import Body
-from mcmj.core.callbacks import install
-from mcmj.core.callbacks.leapfrog import node_velocities
+from mcmj.core.callbacks.leapfrog import node_velocities, userdata_size
 from mcmj.core.callbacks.spring_laws import spring_law
 from mcmj.core.integrators import integrator_named
 from mcmj.core.options import Options
 from mcmj.core.rollout_arguments import Drive
 from mcmj.core.trajectory import State
-from mcmj.mjcf.read import load_model
-from mcmj.mjcf.write import to_mjcf
+from mcmj.mjcf.body_model import body_model, has_tendons
+from mcmj.mjcf.without_tendons import cut_springs
 from mcmj.simulation.batch_engine import BatchEngine, Channels, shifted
-from mcmj.simulation.damage import alter
+from mcmj.simulation.damage import cut_tendons, set_masses
 from mcmj.utils.errors import InvalidArgumentError
 from mcmj.utils.validation import Array, as_array
 
@@ -33,25 +32,14 @@ class BodyEngine(BatchEngine):
             "survives stiff dampers), or smaller forces and readout weights"
         )
         self._physics_step = options.physics_step
-        xml = to_mjcf(
-            body,
-            timestep=self._physics_step,
-            integrator=integrator,
-            w_out=np.zeros((body.n_springs + 1, body.n_outputs)),
-            springs=options.springs,
-            feedback_delay=options.feedback_delay * timestep,
-            control_period=timestep if substeps > 1 else 0.0,
-        )
-        law = spring_law(options.springs)
         self._by_callback = integrator_named(integrator).by_callback
-        self._passive = law is not None or self._by_callback
-        install.install(passive=self._passive)  # first: MuJoCo's compiler calls them too
-        model = load_model(xml)
-        model.actuator_biasprm[body.n_inputs :, 0] = 0.0  # open until a drive closes it
-        if substeps > 1:  # the first sample at t = 0: MJCF takes no phase beyond a period
-            model.sensor_interval[: body.n_springs, 1] -= timestep
-        if law is not None:
-            model.tendon_user[: body.n_springs, 1] = law.key(body.n_springs)
+        self._tendons = has_tendons(options)
+        own = not self._tendons
+        self._passive = own or spring_law(options.springs) is not None or self._by_callback
+        self._sensors = own
+        self.install()  # first: MuJoCo's compiler calls them too
+        model = body_model(body, options)
+        self._memory = slice(0, userdata_size(model.nv) if self._by_callback else 0)
         # joints are n<i>x, n<i>y (, n<i>z) in node order
         first = body.dimensions * np.arange(len(body.free))
         channels = Channels(
@@ -71,7 +59,12 @@ class BodyEngine(BatchEngine):
     def alter(self, cut: Sequence[int], masses: Array | None) -> None:
         """Cut springs and change masses (N,) [kg] of all copies, for good."""
         self.install()
-        alter(self.batch, self.body, cut, masses)
+        if self._tendons:
+            cut_tendons(self.batch, list(cut))
+        else:
+            cut_springs(self.batch.expand("numeric_data"), self.body, list(cut))
+        if masses is not None:
+            set_masses(self.batch, self.body, masses)
 
     def pushes(self, forces: object) -> Array:
         """Forces by name are for models.
@@ -97,7 +90,7 @@ class BodyEngine(BatchEngine):
         free, shape = self.body.free, self.body.positions.shape
         if self._by_callback:  # starts anew
             self.bound("qvel")[:] = self._joint_velocities()
-            self.bound("userdata")[:] = 0.0
+            self.bound("userdata")[:, self._memory] = 0.0
         for name, value, field, origin in (
             ("positions", positions, "qpos", self.body.positions),
             ("velocities", velocities, "qvel", 0.0),
@@ -122,8 +115,11 @@ class BodyEngine(BatchEngine):
 
     def _joint_velocities(self) -> Array:
         """Best estimates (copies, nv) of the velocities now [m/s]."""
-        qvel, userdata = self.bound("qvel"), self.bound("userdata")
-        return node_velocities(qvel, userdata, self._physics_step)
+        return self._after_step(self.bound("qvel"), self.bound("userdata"))
+
+    def _after_step(self, qvel: Array, userdata: Array) -> Array:
+        """The same, from arrays (..., nv) and (..., nuserdata) after a step."""
+        return node_velocities(qvel, userdata[..., self._memory], self._physics_step)
 
     def _velocities(self, qvel: Array) -> Array:
         """Node velocities (..., N, D) from joint velocities (..., nv)."""
@@ -156,7 +152,7 @@ class BodyEngine(BatchEngine):
             elif name == "positions":
                 recorded[name] = self._positions(shifted(qpos, samples, self.substeps))
             else:
-                after = node_velocities(samples, rows["userdata"], self._physics_step)
+                after = self._after_step(samples, rows["userdata"])
                 recorded[name] = self._velocities(shifted(qvel, after, self.substeps))
         return recorded
 

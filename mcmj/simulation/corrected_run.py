@@ -10,13 +10,13 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 
-from mcmj.core.callbacks.library import function_address
+from mcmj.core.callbacks.offsets import function_address
 from mcmj.core.callbacks.online_learning import Learner, Machine, advance, write_weights
 from mcmj.simulation.batch_engine import BatchEngine
 from mcmj.simulation.reservoir import Reservoir
 from mcmj.utils.errors import DivergenceError
 from mcmj.utils.progress import OnSteps
-from mcmj.utils.quiet import quiet_warnings
+from mcmj.utils.quiet import untimed
 from mcmj.utils.validation import Array
 
 _STATE = mujoco.mjtState.mjSTATE_INTEGRATION.value
@@ -74,7 +74,7 @@ def run_corrected(
             engine.install()  # somebody may have taken callbacks out meanwhile
             controls, time = _controls(engine, stretch), data.time
             targets = np.ascontiguousarray(stretch.targets, np.float64)  # one kind is compiled
-            with quiet_warnings():
+            with untimed():
                 steps = advance(machine, learner, controls, targets, every)
             if steps < len(controls):
                 raise _divergence(engine, time + steps * engine.timestep, done + steps)

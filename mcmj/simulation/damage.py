@@ -35,14 +35,16 @@ def checked_masses(body: Body, masses: object) -> Array:
     return array
 
 
-def alter(batch: Batch, body: Body, cut: Sequence[int], masses: Array | None) -> None:
-    """Springs without force, native or custom (law 0 is none); masses (N,) [kg]."""
-    springs = list(cut)
+def cut_tendons(batch: Batch, springs: list[int]) -> None:
+    """Tendons without force, native or custom (law 0 is none)."""
     for name in _NATIVE:
         batch.expand(name)[:, springs] = 0.0
     users = batch.expand("tendon_user")
     if users.shape[-1]:
         users[:, springs, 1] = 0.0
-    if masses is not None:
-        batch.expand("body_mass")[:, 1:] = masses[body.free]
-        batch.set_const()  # what MuJoCo derives from masses
+
+
+def set_masses(batch: Batch, body: Body, masses: Array) -> None:
+    """Masses (N,) [kg] of the nodes; those of fixed ones do nothing."""
+    batch.expand("body_mass")[:, 1:] = masses[body.free]
+    batch.set_const()  # what MuJoCo derives from masses

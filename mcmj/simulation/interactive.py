@@ -57,6 +57,7 @@ class LiveLoop:
     @property
     def outputs(self) -> Array:
         """What is fed back now (n_outputs,): the readout's outputs, or their frozen values."""
+        self._engine.install()  # which measures a body's lengths
         with quiet_warnings():
             mujoco.mj_fwdPosition(self.model, self.data)
             mujoco.mj_sensorPos(self.model, self.data)

@@ -7,7 +7,7 @@ from typing import ClassVar, cast
 from mcmj.core.body import Body
 from mcmj.core.callbacks.spring_laws import SpringLaw
 from mcmj.core.integrators import DEFAULT_INTEGRATOR
-from mcmj.core.options import Options
+from mcmj.core.options import TENDONS, Options
 from mcmj.core.trajectory import State
 from mcmj.mjcf.write import to_mjcf
 from mcmj.reference.twin.engine import TwinEngine
@@ -39,8 +39,11 @@ class Simulation(Reservoir):
         feedback_delay: number of control steps between a length and the force it feeds back;
             the first that many outputs fed back are 0.
         substeps: physics steps in a control step.
-        engine: "mujoco", or "twin" for the compiled twin (Euler, RK4, leapfrog; native springs,
-            no delay, no substeps, no positions recorded), tens of times faster, for screening.
+        engine: "mujoco", whose springs are mcmj's compiled callbacks, but for the integrators that
+            need their derivatives; "tendons": MuJoCo's own tendons always, as in the body's file,
+            the same to rounding at twice the time; or "twin" for the compiled twin (Euler, RK4,
+            leapfrog; native springs, no delay, no substeps, no positions recorded), tens of
+            times faster, for screening.
 
     Raises:
         InvalidArgumentError, UnknownNameError: an argument out of bounds.
@@ -139,6 +142,21 @@ class Simulation(Reservoir):
             integrator=self.options.integrator,
             w_out=self.w_out,
         )
+
+    def with_tendons(self) -> "Simulation":
+        """The same at its start, with cuts and masses, in a model whose tendons MuJoCo draws.
+
+        Raises:
+            InvalidArgumentError: the engine is the twin, or there are copies.
+        """
+        self.in_mujoco.install()
+        options = replace(self.options, engine=TENDONS)
+        names = [field.name for field in fields(options)]
+        stepping = {name: getattr(options, name) for name in names}
+        other = Simulation(self.body, w_out=self.w_out, **stepping)
+        for cut, masses in self._alterations:
+            other.alter(cut=cut, masses=masses)
+        return other
 
     def check_alteration(self, cut: Sequence[int], masses: object) -> None:
         """Raise unless `alter` can do this.

@@ -17,7 +17,7 @@ RECORD = ("lengths", "outputs", "positions", "velocities")
 # measured: at most 2e-13 m on lengths up to 80 m, 1e-13 m/s
 SAME = {"lengths": 1e-12, "outputs": 1e-13, "positions": 1e-12, "velocities": 1e-12}
 MUJOCO_S_OWN = ("Euler", "RK4", "implicit", "implicitfast", "discrete")
-CALLBACKS = ("mjcb_act_bias", "mjcb_passive")
+CALLBACKS = ("mjcb_act_bias", "mjcb_passive", "mjcb_sensor")
 
 
 def assert_same(rollout, twin, tolerance=SAME):
@@ -174,7 +174,7 @@ def run_neighbour():
 
 def test_other_models_run_as_if_we_were_not_there(no_callbacks, body, w_out):
     before = run_neighbour()
-    install.install(passive=True)
+    install.install(passive=True, sensors=True)
     Simulation(body, w_out=w_out, springs="cubic").rollout(5)
     for name in CALLBACKS:
         assert getattr(mujoco, f"get_{name}")() is not None
@@ -195,10 +195,10 @@ def test_two_bodies_in_one_process_do_not_mix(body, w_out, w_bias):
 
 
 def test_install_is_idempotent(no_callbacks):
-    install.install(passive=True)
+    install.install(passive=True, sensors=True)
     first = [getattr(mujoco, f"get_{name}")() for name in CALLBACKS]
     install.install()
-    install.install(passive=True)
+    install.install(passive=True, sensors=True)
     assert all(getattr(mujoco, f"get_{n}")() is f for n, f in zip(CALLBACKS, first, strict=True))
 
 
@@ -206,14 +206,15 @@ def test_install_without_springs_leaves_their_callback_alone(no_callbacks):
     install.install()
     assert mujoco.get_mjcb_act_bias() is not None
     assert mujoco.get_mjcb_passive() is None
+    assert mujoco.get_mjcb_sensor() is None
 
 
 def test_uninstall_restores_none_and_may_be_repeated(no_callbacks):
-    install.install(passive=True)
+    install.install(passive=True, sensors=True)
     for _ in range(2):
         install.uninstall()
-        assert mujoco.get_mjcb_act_bias() is None
-        assert mujoco.get_mjcb_passive() is None
+        for name in CALLBACKS:
+            assert getattr(mujoco, f"get_{name}")() is None
 
 
 @pytest.mark.parametrize("name", CALLBACKS)
@@ -223,13 +224,13 @@ def test_a_foreign_callback_is_neither_replaced_nor_removed(no_callbacks, body, 
 
     getattr(mujoco, f"set_{name}")(foreign)
     with pytest.raises(McmjError, match=rf"another {name} is installed.*set_{name}\(None\)"):
-        install.install(passive=True)
+        install.install(passive=True, sensors=True)
     with pytest.raises(McmjError, match=name):
         Simulation(body, springs="cubic")
     install.uninstall()
     assert getattr(mujoco, f"get_{name}")() is foreign
     getattr(mujoco, f"set_{name}")(None)
-    install.install(passive=True)
+    install.install(passive=True, sensors=True)
     assert getattr(mujoco, f"get_{name}")() not in (None, foreign)
 
 

@@ -47,8 +47,12 @@ def actions_of(env, count, seed=0):
 @pytest.mark.parametrize("integrator", INTEGRATORS)
 def test_the_physics_is_our_closed_loop(one, integrator):
     body, w_out = parts(one)
-    simulation = mcmj.Simulation(body, w_out=w_out, integrator=integrator)
-    env = environment.make(simulation, one.task.target, one.task.setting)
+    simulation = mcmj.Simulation(body, w_out=w_out, integrator=integrator, engine="tendons")
+    env = environment.make(
+        mcmj.Simulation(body, w_out=w_out, integrator=integrator),
+        one.task.target,
+        one.task.setting,
+    )
     actions = actions_of(env, 30)
     steps = [env.reset(), *(env.step(action) for action in actions)]
     held = np.repeat(actions, 20, axis=0)
@@ -70,7 +74,7 @@ def test_an_episode_on_the_cycle_goes_on_under_its_integrator(one, integrator):
     simulation = mcmj.Simulation(body, w_out=w_out, integrator=integrator)
     env = environment.make(simulation, wanted, setting, inputs=[0.3, -0.2])
     steps = [env.reset(), *(env.step(np.zeros(4)) for _ in range(10))]
-    simulation = mcmj.Simulation(body, integrator=integrator)
+    simulation = mcmj.Simulation(body, integrator=integrator, engine="tendons")
     synchronise(simulation, wanted, 20.0, [0.3, -0.2])
     simulation.set_readout(w_out)
     run = simulation.rollout(inputs=np.tile([0.3, -0.2], (201, 1)))

@@ -99,7 +99,7 @@ def test_what_the_twin_does_not_do_is_named(body):
         assert str(caught.value) == text
     with pytest.raises(UnknownNameError, match="Euler, RK4, leapfrog"):
         mcmj.Simulation(body, engine="twin", integrator="discrete")
-    with pytest.raises(UnknownNameError, match="mujoco, twin"):
+    with pytest.raises(UnknownNameError, match="mujoco, tendons, twin"):
         mcmj.Simulation(body, engine="jax")
     with pytest.raises(
         UnknownNameError, match=r"record .positions.; valid choices: lengths, outputs"

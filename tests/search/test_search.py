@@ -111,7 +111,11 @@ def test_an_experiment_without_bodies_or_engines_of_its_own(tmp_path, monkeypatc
         ({"vary": ("teaching.noise=3",)}, InvalidArgumentError, "teaching.noise: expected"),
         ({"set": ("seed=3",)}, InvalidArgumentError, "each field once, seed excepted, got seed"),
         ({"set": ("windows=0",), "vary": ("windows=[0]",)}, InvalidArgumentError, "got windows"),
-        ({"engine": "gpu"}, UnknownNameError, "unknown engine 'gpu'; valid choices: mujoco, twin"),
+        (
+            {"engine": "gpu"},
+            UnknownNameError,
+            "unknown engine 'gpu'; valid choices: mujoco, tendons, twin",
+        ),
         ({"workers": 2, "scheduler": "tcp://x:1"}, InvalidArgumentError, "none beside a scheduler"),
         ({"seeds": 0}, InvalidArgumentError, "seeds: expected an integer in [1, 1000000]"),
     ],

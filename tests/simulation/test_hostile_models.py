@@ -27,7 +27,7 @@ def all_springs(x1, x2, parameters, out):
         out[j] = parameters[j, 0] * x1[j]
 sims = [mcmj.Simulation(body, integrator="leapfrog"), mcmj.Simulation(body, springs="tansig"),
         mcmj.Simulation(body, springs=CoupledLaw("all_springs", all_springs))]
-keys = [sim.model.tendon_user[0, 1] for sim in sims[1:]]
+keys = [sim.model.numeric('springs').data[5] for sim in sims[1:]]
 """
 RUN = """
 for name, text in json.load(sys.stdin).items():
@@ -48,6 +48,45 @@ for tag in (20120595.0, 20120595.5):
         data.qpos[:] = 0.01 * np.arange(model.nv)
         mujoco.mj_step(model, data)
         print(data.qfrc_passive.any())
+"""
+# a body's table of springs with numbers that do not fit, then its memory, sensors and channels
+TABLES = """
+import dataclasses
+from mcmj.core.callbacks.spring_table import HEAD, NODE
+from mcmj.core.options import Options
+from mcmj.mjcf.without_tendons import model_without_tendons
+from mcmj.mjcf.write import to_mjcf
+body, rng = dataclasses.replace(body), np.random.default_rng(0)
+options = Options(feedback_delay=2, integrator="leapfrog", springs="tansig")
+bad = [-1.0, -2.0, 0.5, 3.0, 1e3, 1e9, 2.0**31, 1e300, -1e300, np.nan, np.inf, -np.inf, 2.0**53]
+places = [*range(1, HEAD + NODE * body.n_nodes), *range(-8 * body.n_springs, -6 * body.n_springs)]
+def runs(model):
+    data = mujoco.MjData(model)
+    data.qpos[:] = 0.01 * np.arange(model.nv)
+    mujoco.mj_step(model, data, 3)
+    mujoco.mj_forward(model, data)
+    return bool(data.qfrc_passive.any())
+print("whole", runs(model_without_tendons(body, options)))
+for place in places:
+    for value in bad:
+        model = model_without_tendons(body, options)
+        model.numeric("springs").data[place] = value
+        runs(model)
+block = model_without_tendons(body, options).numeric("springs").data.copy()
+for userdata, sensors, joints in ((0, 0, 0), (10, 3, 2), (500, 40, 9), (3, 8, 6)):
+    spec = mujoco.MjSpec()
+    spec.nuserdata = userdata
+    spec.add_numeric(name="springs", data=block)
+    spec.add_numeric(name="leapfrog", data=[20120595.0])
+    node = spec.worldbody
+    for _ in range(joints):
+        node = node.add_body(mass=1.0, inertia=np.ones(3), explicitinertial=True)
+        node.add_joint(type=mujoco.mjtJoint.mjJNT_HINGE)
+    if sensors:
+        spec.add_sensor(type=mujoco.mjtSensor.mjSENS_USER, dim=sensors,
+                        needstage=mujoco.mjtStage.mjSTAGE_POS)
+    runs(spec.compile())
+    print(userdata)
 """
 READOUTS = [
     ("1e9", "5"), ("-1e9", "5"), ("0", "1e9"), ("0", "-3"), ("1e300", "1"), ("2", "1e15"),
@@ -88,6 +127,11 @@ def test_a_law_is_called_only_by_springs_that_it_was_made_for():
     assert own == ["True", "False", "False", "True"]
     larger = mcmj.to_mjcf(mcmj.random_body(0, 9), springs="tansig")
     assert in_a_process(OWN_KEYS, larger) == ["True", "False", "False", "False"]
+
+
+def test_no_table_of_springs_can_harm():
+    """Every number of its head and every index wrong, in models of other sizes too."""
+    assert in_a_process(TABLES, "") == ["whole True", "0", "10", "500", "3"]
 
 
 def test_a_readout_outside_the_sensors_is_ignored():

@@ -189,6 +189,7 @@ def test_a_body_is_the_same_as_a_reservoir_and_as_a_simulation(body, w_bias):
     ],
 )
 def test_what_a_model_has_not_is_named(changes, error, text):
+    mujoco.MjModel.from_xml_string("<mujoco/>")  # the last one that MuJoCo can write
     given = {"model": ARM, "sensors": "q1", "channels": ["m1"]} | changes
     with pytest.raises(error, match=text):
         Reservoir(given.pop("model"), **given)

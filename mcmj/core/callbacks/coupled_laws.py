@@ -18,7 +18,7 @@ from mcmj.core.callbacks.spring_laws import SpringLaw
 
 CoupledPull = Callable[[Any, Any, Any, Any], None]
 
-_FIRST_PARAMETER = 3  # tendon user data: tag, key, l0, k1, k3, d1, d3
+_FIRST_PARAMETER = 3  # rows: two that it does not see, l0, k1, k3, d1, d3
 _SIGNATURE = types.void(*[types.int64] * 6)
 
 

@@ -1,67 +1,52 @@
-"""The compiled callbacks: the readout law here, passive forces in passive.py, run in C.
+"""The compiled callbacks, run in C: each of MuJoCo's kinds is installed here.
 
-Readout law (design: one law for every experiment), for feedback channel c with gate g_c:
+    mjcb_act_bias   readout_law.py      feedback of bodies with tendons
+    mjcb_passive    passive.py          springs, spring laws, the leapfrog
+    mjcb_sensor     length_sensors.py   lengths of springs that are no tendons
+    mjcb_control    reservoir_law.py    the law of reservoirs in any model
 
-    bias force of actuator c = g_c (sum_j user[c, j] s_j + user[c, n])     s = length sensors
-
-It is MuJoCo's own actuator law, force = gain * ctrl + bias, with ctrl as the offset. The
-actuator carries biasprm = [gate, TAG, address of the first sensor, number of sensors, 1 if
-they are delayed] and the weights (and, if there is room, the readout's bias) as user data.
-
-Both callbacks do nothing in models without the TAG, so others in the process are safe. MuJoCo
+All callbacks do nothing in models without a tag of ours, so others in the process are safe. MuJoCo
 holds one callback of each kind per process: `install` refuses to replace one that is not
 ours, and `uninstall` takes ours out again.
 """
 
 from collections.abc import Callable
+from typing import NamedTuple
 
 import mujoco
 import numba
 from numba import types
 
+from mcmj.core.callbacks.length_sensors import compile_sensors
 from mcmj.core.callbacks.offsets import word_offsets
 from mcmj.core.callbacks.passive import compile_passive
-from mcmj.core.callbacks.pointers import TAG, WORDS, CFunction, doubles
+from mcmj.core.callbacks.pointers import WORDS, CFunction
+from mcmj.core.callbacks.readout_law import COMPILE, fed_back
 from mcmj.core.callbacks.reservoir_law import compile_control
 from mcmj.utils.errors import McmjError
 
-N_BIAS_PARAMETERS = 10  # mjNBIAS
 
-_FAST = {"contract", "reassoc", "nsz", "arcp"}  # NaN and infinity keep their meaning
+class Offsets(NamedTuple):
+    """Where the readout law's fields are in mjModel and mjData, in words."""
+
+    nuser_actuator: int
+    nsensordata: int
+    actuator_user: int
+    actuator_biasprm: int
+    sensordata: int
 
 
 def _compile_readout() -> CFunction:
-    """The mjcb_act_bias callback. Offsets are closure variables: Numba's cache keys on them."""
-    fields = ("nuser_actuator", "nsensordata", "actuator_user", "actuator_biasprm")
-    model_at, data_at = word_offsets("mjModel", fields), word_offsets("mjData", ["sensordata"])
-    n_user_at, user_at = model_at["nuser_actuator"], model_at["actuator_user"]
-    n_data_at = model_at["nsensordata"]
-    parameters_at, sensors_at = model_at["actuator_biasprm"], data_at["sensordata"]
+    """The mjcb_act_bias callback. Offsets are a closure variable: Numba's cache keys on them."""
+    model_fields, data_fields = Offsets._fields[:4], Offsets._fields[4:]
+    words = word_offsets("mjModel", model_fields) | word_offsets("mjData", data_fields)
+    at = Offsets(**words)
 
     def readout(model, data, actuator):
-        parameters = doubles(model[parameters_at])
-        first = actuator * N_BIAS_PARAMETERS
-        gate = parameters[first]
-        if parameters[first + 1] != TAG or gate == 0.0:
-            return 0.0
-        n_user, start, count = model[n_user_at], parameters[first + 2], parameters[first + 3]
-        inside = start >= 0.0 and 1.0 <= count <= n_user and start + count <= model[n_data_at]
-        if not inside:  # also NaN: a model that mcmj did not write
-            return 0.0
-        n_sensors = numba.int64(count)
-        weights = numba.carray(doubles(model[user_at] + 8 * n_user * actuator), n_user)
-        sensors = numba.carray(doubles(data[sensors_at] + 8 * numba.int64(start)), n_sensors)
-        if parameters[first + 4] != 0.0 and sensors[0] == 0.0:
-            return 0.0  # a delayed sensor that has nothing to show yet
-        output = 0.0
-        for j in range(n_sensors):
-            output += weights[j] * sensors[j]
-        if n_user > n_sensors:
-            output += weights[n_sensors]
-        return gate * output
+        return fed_back(model, data, at, actuator)
 
     signature = types.float64(WORDS, WORDS, types.int32)
-    return numba.cfunc(signature, cache=True, fastmath=_FAST)(readout).ctypes
+    return numba.cfunc(signature, **COMPILE)(readout).ctypes
 
 
 class _Callback:
@@ -95,6 +80,7 @@ class _Callback:
 
 _READOUT = _Callback("mjcb_act_bias", _compile_readout)
 _PASSIVE = _Callback("mjcb_passive", compile_passive)
+_SENSORS = _Callback("mjcb_sensor", compile_sensors)
 _CONTROL = _Callback("mjcb_control", compile_control)
 
 
@@ -107,11 +93,12 @@ def install_control() -> None:
     _CONTROL.install()
 
 
-def install(*, passive: bool = False) -> None:
-    """Install the readout callback, and that of passive forces if asked; idempotent.
+def install(*, passive: bool = False, sensors: bool = False) -> None:
+    """Install the readout callback, and the others if asked; idempotent.
 
     Args:
-        passive: custom spring laws, or an integrator by callback, will be used.
+        passive: springs that are no tendons, custom spring laws, or an integrator by callback.
+        sensors: lengths of springs that are no tendons.
 
     Raises:
         McmjError: another package's callback of that kind is installed.
@@ -119,6 +106,8 @@ def install(*, passive: bool = False) -> None:
     _READOUT.install()
     if passive:
         _PASSIVE.install()
+    if sensors:
+        _SENSORS.install()
 
 
 def uninstall() -> None:
@@ -126,3 +115,4 @@ def uninstall() -> None:
     _READOUT.uninstall()
     _CONTROL.uninstall()
     _PASSIVE.uninstall()
+    _SENSORS.uninstall()

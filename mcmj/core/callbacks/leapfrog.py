@@ -26,11 +26,13 @@ slide joints and tendons. Forces in xfrc_applied are not averaged, and act h/2 e
 
 from typing import Any
 
+import numpy as np
 from llvmlite import binding
 from numba import njit, types
 
-from mcmj.core.callbacks.library import function_address
+from mcmj.core.callbacks.offsets import function_address
 from mcmj.core.callbacks.pointers import TAG, WORDS, address_of, doubles, integers
+from mcmj.core.callbacks.readout_law import add_channels
 from mcmj.utils.validation import Array
 
 _HEAD = 2  # of userdata, before its five rows
@@ -75,7 +77,7 @@ def memory_rows(data, at):
 @njit(**COMPILE)
 def runs_leapfrog(model, at):
     """Whether this model is to be integrated so."""
-    if model[at.nuserdata] != _HEAD + 5 * model[at.nv]:
+    if model[at.nuserdata] < _HEAD + 5 * model[at.nv]:
         return False
     if integers(address_of(model) + at.integrator)[0] != 0:  # mjINT_EULER
         return False
@@ -88,16 +90,27 @@ def runs_leapfrog(model, at):
 
 
 @njit(**COMPILE)
+def count_step(head, now, step):
+    """Whether the time is not that of the last call; head: [steps since the start, their time].
+
+    A step is counted where one ended; a jump in time starts anew, with step 1.
+    """
+    if head[0] != 0.0 and now == head[1]:
+        return False
+    on_time = abs(now - head[1] - step) <= 1e-6 * step
+    head[0] = head[0] + 1.0 if head[0] > 0.0 and on_time else 1.0
+    head[1] = now
+    return True
+
+
+@njit(**COMPILE)
 def begin_step(model, data, at):
     """Bring the memory to the present time, but for f_k and A_k, and take native dampers out."""
     nv, step = model[at.nv], doubles(address_of(model) + at.timestep)[0]
     now = doubles(address_of(data) + 8 * at.time)[0]
     velocity, head = doubles(data[at.qvel]), doubles(data[at.userdata])
     rows = memory_rows(data, at)
-    if head[0] == 0.0 or now != head[1]:
-        on_time = abs(now - head[1] - step) <= 1e-6 * step
-        head[0] = head[0] + 1.0 if head[0] > 0.0 and on_time else 1.0
-        head[1] = now
+    if count_step(head, now, step):
         for i in range(2 * nv):
             rows[_LAST * nv + i] = rows[i]
     passive, damper = doubles(data[at.qfrc_passive]), doubles(data[at.qfrc_damper])
@@ -117,6 +130,14 @@ def extrapolated_rate(rows, nv, jacobian, column, first, last):
         i = column[e]
         rate += jacobian[e] * (rows[i] + 0.5 * (rows[i] - rows[_LAST * nv + i]))
     return rate
+
+
+@njit(**COMPILE)
+def extrapolated(data, at, nv, out):
+    """V_k (nv,), the velocities that dampers act on."""
+    rows = memory_rows(data, at)
+    for i in range(nv):
+        out[i] = rows[i] + 0.5 * (rows[i] - rows[_LAST * nv + i])
 
 
 @njit(**COMPILE)
@@ -141,16 +162,24 @@ def add_dampers(model, data, at):
 
 
 @njit(**COMPILE)
-def finish_step(model, data, at):
-    """qfrc_passive = F(q_k, V_k) -> s F + (f_k + f_{k-1}) / 2 - f_k: MuJoCo adds f_k itself."""
-    _find_actuator_forces(model, data)  # MuJoCo's next stage, which will find the same
+def finish_step(model, data, at, table):
+    """qfrc_passive = F(q_k, V_k) -> s F + (f_k + f_{k-1}) / 2, less what MuJoCo adds of f_k itself.
+
+    Channels of a spring table are passive forces to MuJoCo.
+    """
     nv, start = model[at.nv], doubles(data[at.userdata])[0] == 1.0
+    pushes = np.zeros(nv)
+    if table.springs > 0:
+        add_channels(model, data, at, table, pushes)
+    else:
+        _find_actuator_forces(model, data)  # MuJoCo's next stage, which will find the same
     rows, mass = memory_rows(data, at), doubles(model[at.dof_M0])
     passive, actuator = doubles(data[at.qfrc_passive]), doubles(data[at.qfrc_actuator])
     applied = doubles(data[at.qfrc_applied])
     share = 0.5 if start else 1.0
     for i in range(nv):
-        held = actuator[i] + applied[i]
+        held = actuator[i] + applied[i] + pushes[i]
         rows[nv + i] = held
         rows[2 * nv + i] = (passive[i] + held) / mass[i]
-        passive[i] = share * passive[i] + 0.5 * (rows[(_LAST + 1) * nv + i] - held)
+        mean = 0.5 * (rows[(_LAST + 1) * nv + i] - held)
+        passive[i] = share * passive[i] + mean + pushes[i]

@@ -1,8 +1,10 @@
-"""Where the fields of MuJoCo's C structs are, from the descriptions that its wheel ships."""
+"""MuJoCo's C interface: where the fields of its structs are, by the descriptions that its wheel
+ships, and its functions in this process."""
 
 import ctypes
 import functools
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
 import mujoco
@@ -47,6 +49,21 @@ def byte_offset(struct: str, path: str) -> int:
     outer: Any = _verified_layout(struct)
     offset = getattr(outer, name).offset
     return offset + getattr(dict(outer._fields_)[name], inner).offset if inner else offset
+
+
+@functools.cache
+def function_address(name: str) -> int:
+    """The address of a function of MuJoCo's C interface, "mj_step" say.
+
+    Raises:
+        McmjError: MuJoCo's library is not where its wheels have it.
+    """
+    folder = Path(mujoco.__file__).parent
+    for pattern in ("libmujoco*.so*", "libmujoco*.dylib", "mujoco.dll"):
+        for library in sorted(folder.glob(pattern)):
+            function = getattr(ctypes.CDLL(str(library)), name)
+            return int(ctypes.cast(function, ctypes.c_void_p).value or 0)
+    raise McmjError(f"no MuJoCo library in {folder}")
 
 
 @functools.cache

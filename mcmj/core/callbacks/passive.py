@@ -1,8 +1,9 @@
-"""MuJoCo's passive force callback: custom spring laws, and what the leapfrog adds.
+"""MuJoCo's passive force callback: springs, custom spring laws, and what the leapfrog adds.
 
-MuJoCo holds one such callback per process, so one does both, each for the models that ask for
-it, and nothing for others. A tendon with user data [TAG, key of the law (callbacks.law_table), l0,
-k1, k3, d1, d3] is pulled through its sparse Jacobian by
+MuJoCo holds one such callback per process, so one does all, each for the models that ask for
+it, and nothing for others. A model without tendons has a table of its springs and channels
+(spring_table.py, node_springs.py, readout_law.py). A tendon with user data [TAG, key of the law
+(callbacks.law_table), l0, k1, k3, d1, d3] is pulled through its sparse Jacobian by
 
     law(l - l0, dl/dt, k1, k3, d1, d3)
 
@@ -28,6 +29,7 @@ from mcmj.core.callbacks.leapfrog import (
     memory_rows,
     runs_leapfrog,
 )
+from mcmj.core.callbacks.node_springs import add_node_springs
 from mcmj.core.callbacks.offsets import byte_offset, word_offsets
 from mcmj.core.callbacks.pointers import (
     COUPLED_TAG,
@@ -39,16 +41,19 @@ from mcmj.core.callbacks.pointers import (
     doubles,
     integers,
 )
+from mcmj.core.callbacks.readout_law import add_channels
+from mcmj.core.callbacks.spring_table import read_table
 
 SPRING_USER_SIZE = 7
 
 _MODEL = (
-    "nv ntendon nuserdata nnumeric nnumericdata numeric_adr numeric_data dof_M0 nuser_tendon "
+    "nq nv nu ntendon nuserdata nnumeric nnumericdata numeric_adr numeric_size numeric_data dof_M0 "
+    "nuser_actuator nsensordata actuator_user actuator_biasprm nuser_tendon "
     "tendon_user tendon_damping tendon_dampingpoly ten_J_rownnz ten_J_rowadr ten_J_colind"
 )
 _DATA = (
-    "time qvel userdata ten_J ten_length ten_velocity qfrc_damper qfrc_passive qfrc_actuator "
-    "qfrc_applied"
+    "time qpos qvel ctrl sensordata userdata ten_J ten_length ten_velocity qfrc_damper "
+    "qfrc_passive qfrc_actuator qfrc_applied"
 )
 _named_tuple: Any = namedtuple  # mypy wants literal names
 # where they are, in words; and two options, in bytes
@@ -66,14 +71,18 @@ def compile_passive() -> CFunction:
     )
 
     def passive(model, data):
-        leapfrog = runs_leapfrog(model, at)
+        leapfrog, table = runs_leapfrog(model, at), read_table(model, at)
         if leapfrog:
             begin_step(model, data, at)
         if model[at.nuser_tendon] >= SPRING_USER_SIZE:
             add_springs(model, data, at, leapfrog)
+        if table.springs > 0:
+            add_node_springs(model, data, at, table, leapfrog)
         if leapfrog:
             add_dampers(model, data, at)
-            finish_step(model, data, at)
+            finish_step(model, data, at, table)
+        else:
+            add_channels(model, data, at, table, doubles(data[at.qfrc_passive]))
 
     return numba.cfunc(types.void(WORDS, WORDS), cache=True)(passive).ctypes
 

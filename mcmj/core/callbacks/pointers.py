@@ -4,7 +4,7 @@ from collections.abc import Callable
 from typing import Any
 
 from llvmlite import ir
-from numba import extending, types
+from numba import extending, int64, njit, types
 
 intrinsic: Any = extending.intrinsic  # compiled calls do not have its Python signature
 
@@ -85,3 +85,26 @@ def _int_to_pointer(element: ir.Type) -> Callable:
         return builder.inttoptr(args[0], element.as_pointer())
 
     return codegen
+
+
+@njit(cache=True)
+def find_numeric(model, at, tag, least):
+    """Where the custom numeric that begins with a tag starts, and its size, at least `least`.
+
+    -1 and 0 without one. `at` has the offsets of nnumeric, numeric_adr, ..; nothing beyond the
+    model's own numbers is read.
+    """
+    addresses, sizes = integers(model[at.numeric_adr]), integers(model[at.numeric_size])
+    values = doubles(model[at.numeric_data])
+    for i in range(model[at.nnumeric]):
+        last = model[at.nnumericdata] - sizes[i]
+        fits = sizes[i] >= least and 0 <= addresses[i] <= last
+        if fits and values[addresses[i]] == tag:
+            return int64(addresses[i]), int64(sizes[i])
+    return int64(-1), int64(0)
+
+
+@njit(cache=True)
+def whole(value, end):
+    """The whole part of a number of a model if it is from 0 to end - 1, else -1; NaN is not."""
+    return int64(value) if 0.0 <= value < end else -1

@@ -23,7 +23,14 @@ import numba
 from numba import types
 
 from mcmj.core.callbacks.offsets import byte_offset, word_offsets
-from mcmj.core.callbacks.pointers import WORDS, CFunction, address_of, doubles, integers
+from mcmj.core.callbacks.pointers import (
+    WORDS,
+    CFunction,
+    address_of,
+    doubles,
+    find_numeric,
+    whole,
+)
 
 RESERVOIR_TAG = 201205.0  # six digits are what MuJoCo's writer of MJCF keeps
 NUMERIC = "mcmj_reservoir"
@@ -99,7 +106,7 @@ def compile_control() -> CFunction:
     at = Offsets(**words, time=byte_offset("mjData", "time"))
 
     def control(model, data):
-        start, size = find_block(model, at)
+        start, size = find_numeric(model, at, RESERVOIR_TAG, _HEAD)
         if start < 0:
             return
         values = numba.carray(doubles(model[at.numeric_data] + 8 * start), size)
@@ -111,25 +118,6 @@ def compile_control() -> CFunction:
         set_controls(values, law, model, data, at, time >= values[7])
 
     return numba.cfunc(types.void(WORDS, WORDS), cache=True)(control).ctypes
-
-
-@numba.njit(**COMPILE)
-def find_block(model, at):
-    """Where the reservoir's block begins in the custom numerics, and its size; -1 without."""
-    addresses, sizes = integers(model[at.numeric_adr]), integers(model[at.numeric_size])
-    values = doubles(model[at.numeric_data])
-    for i in range(model[at.nnumeric]):
-        last = model[at.nnumericdata] - sizes[i]
-        fits = sizes[i] >= _HEAD and 0 <= addresses[i] <= last
-        if fits and values[addresses[i]] == RESERVOIR_TAG:
-            return numba.int64(addresses[i]), numba.int64(sizes[i])
-    return numba.int64(-1), numba.int64(0)
-
-
-@numba.njit(**COMPILE)
-def whole(value, end):
-    """The whole part of a number of a model if it is from 0 to end - 1, else -1; NaN is not."""
-    return numba.int64(value) if 0.0 <= value < end else -1
 
 
 @numba.njit(**COMPILE)

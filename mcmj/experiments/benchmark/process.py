@@ -28,7 +28,7 @@ def start_up(config: Config, body: Body) -> dict[str, object]:
     snippets = {
         "import_seconds": "import mcmj",
         "import_and_callbacks_seconds": "from mcmj.core.callbacks import install\n"
-        "install.install(passive=True)",
+        "install.install(passive=True, sensors=True)",
     }
     seconds = interleaved_seconds(
         {

@@ -15,6 +15,7 @@ from mcmj.core.random_body import random_body
 from mcmj.core.rollout_arguments import check_drive
 from mcmj.experiments.benchmark.config import Config, small_readout
 from mcmj.experiments.benchmark.full_scene import full_scene
+from mcmj.experiments.benchmark.lean import lean_costs
 from mcmj.experiments.benchmark.models import model_costs
 from mcmj.experiments.benchmark.process import machine, memory, start_up
 from mcmj.experiments.benchmark.trials import trial_costs
@@ -203,6 +204,7 @@ def learning_costs(config: Config, body: Body) -> dict[str, object]:
 
 PARTS = (
     loop_costs,
+    lean_costs,
     model_costs,
     learning_costs,
     twin_costs,

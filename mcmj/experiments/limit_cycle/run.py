@@ -162,7 +162,7 @@ def _run_task(
     first = free_run(
         simulation, total - last, done=done, checkpoint=checkpoint, fit=fit, on_steps=on_steps
     )
-    seen = ("positions",) if config.engine == "mujoco" else ()
+    seen = ("positions",) if config.engine != "twin" else ()
     end = simulation.rollout(last, record=("outputs", *seen))
     on_steps(last)
     outputs = np.concatenate([first, end.get("outputs")])

@@ -35,7 +35,7 @@ def run(config: Config, *, on_steps: OnSteps = lambda steps: None) -> Result:
 def get_body(config: Config, seed: int) -> tuple[Body, dict[str, object], dict[str, Any]]:
     """The body of a seed, or the config's; where it comes from; arguments of its Simulation."""
     stored = config.source.get(seed)
-    names = ("integrator", "springs") if config.engine == "mujoco" else ()
+    names = ("integrator", "springs") if config.engine != "twin" else ()
     return stored.body, stored.provenance, stored.take(*names, timestep=config.timestep)
 
 

@@ -210,6 +210,8 @@ def make(
         InvalidArgumentError: a target, input or setting that does not fit the reservoir.
     """
     setting = setting or Setting()
+    if isinstance(reservoir, Simulation):
+        reservoir = reservoir.with_tendons()  # springs that are seen
     require_outputs(reservoir, target, "reservoir")
     setting.check_step(reservoir.timestep)
     constant = np.zeros(reservoir.n_inputs) if inputs is None else inputs
