@@ -101,7 +101,8 @@ def test_a_run_that_blows_up_says_so(tmp_path):
 
 def test_an_interrupt_leaves_nothing_half_written(tmp_path):
     process = start(
-        "limit_cycle", "--seed", "1", "--no-video", "--quiet", "--out", tmp_path,
+        "limit_cycle", "--seed", "1", "--free-run", "5000", "--no-video", "--quiet",
+        "--out", tmp_path,
         preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),  # in a background shell
     )  # fmt: skip
     time.sleep(6)
