@@ -42,8 +42,8 @@ class Simulation(Reservoir):
         engine: "mujoco", whose springs are mcmj's compiled callbacks, but for the integrators that
             need their derivatives; "tendons": MuJoCo's own tendons always, as in the body's file,
             the same to rounding at twice the time; or "twin" for the compiled twin (Euler, RK4,
-            leapfrog; native springs, no delay, no substeps, no positions recorded), tens of
-            times faster, for screening.
+            leapfrog; native springs, no delay, no substeps, no positions recorded), some
+            twenty times faster, for screening.
 
     Raises:
         InvalidArgumentError, UnknownNameError: an argument out of bounds.

@@ -16,7 +16,7 @@ def attractor_errors(body: Body, *, seed: int) -> dict[str, dict[str, float]]:
     """Orbit errors [task]["A_to_B"] of readouts taught under integrator A and run under B.
 
     Each run starts from clean teacher forcing under B; the error is that of the last WINDOW
-    seconds of a free run. The twin agrees with MuJoCo to rounding and is tens of times faster.
+    seconds of a free run. The twin agrees with MuJoCo to rounding and is some twenty times faster.
     """
     teaching = Teaching()
     table: dict[str, dict[str, float]] = {}
