@@ -222,7 +222,7 @@ def test_a_swimmer_elsewhere_and_turned_has_the_same_multipliers():
         cycle = find_cycle(loop, loop.now, 0.86, settle=60.0)
         found.append((cycle.period, multipliers_of(loop, cycle)))
     (period, one), (other_period, other) = found
-    assert other_period == pytest.approx(period, rel=1e-12)
+    assert other_period == pytest.approx(period, rel=1e-11)
     np.testing.assert_allclose(other.multipliers, one.multipliers, atol=1e-8)
     assert one.neutral == 1
     assert one.leading_nontrivial < 0.95

@@ -101,7 +101,7 @@ def test_it_is_a_plain_loop_of_steps_and_corrections(make, integrator, gate):
     rows, data = by_hand(simulation, copy.deepcopy(learner), drive, gate)
     run_corrected(simulation, learner, [drive], every=EVERY, gate=gate)
     assert np.abs(simulation.readout.rows - rows).max() < 1e-12 * np.abs(rows).max()
-    assert np.abs(state_of(simulation) - np.append(data.qpos, data.qvel)).max() < 3e-14
+    assert np.abs(state_of(simulation) - np.append(data.qpos, data.qvel)).max() < 1e-13
     assert simulation.time == pytest.approx(data.time, rel=3e-12)
 
 
@@ -114,7 +114,7 @@ def test_late_signals_are_learned_from_as_they_are_heard(late):
     rows, data = by_hand(simulation, copy.deepcopy(learner), drive, 1.0, is_late)
     run_corrected(simulation, learner, [drive], every=EVERY)
     assert np.abs(simulation.readout.rows - rows).max() < 1e-12 * np.abs(rows).max()
-    assert np.abs(state_of(simulation) - np.append(data.qpos, data.qvel)).max() < 3e-14
+    assert np.abs(state_of(simulation) - np.append(data.qpos, data.qvel)).max() < 1e-13
 
 
 @pytest.mark.parametrize("make", [
@@ -174,7 +174,7 @@ def test_under_a_teacher_it_is_ridge_regression_of_the_same_samples(make):
     run_corrected(simulation, learner, parts[1:], every=EVERY, gate=0.0)
     mean, spread = signals[:half].mean(axis=0), signals[:half].std(axis=0)
     assert learner.mean == pytest.approx(mean, rel=1e-12, abs=1e-12)
-    assert learner.inverse_spread == pytest.approx(1.0 / spread, rel=1e-10)
+    assert learner.inverse_spread == pytest.approx(1.0 / spread, rel=1e-9)
     features = np.column_stack([(signals - mean) / spread, np.ones(len(signals))])
     penalty = ridge * np.diag([*np.ones(len(mean)), 0.0])
     w = np.linalg.solve(features.T @ features + penalty, features.T @ drive.targets)

@@ -153,7 +153,7 @@ def test_a_delay_feeds_back_what_was():
         y = (np.array(seen[k - 3]) @ w_out[:2] + w_out[2])[0] if k >= 3 else 0.0
         data.ctrl[model.actuator("m1").id] = y + 1.0
         mujoco.mj_step(model, data)
-    assert np.abs(run.signals - seen).max() < 1e-15  # 0 here
+    assert np.abs(run.signals - seen).max() < 1e-14  # 0 here
 
 
 def test_a_body_is_the_same_as_a_reservoir_and_as_a_simulation(body, w_bias):
@@ -361,7 +361,7 @@ def test_a_heavier_body_and_a_cut_tendon_are_another_model():
     spec.body("b").geoms[0].density *= 2
     data = mujoco.MjData(model := spec.compile())
     mujoco.mj_step(model, data, 499)
-    assert np.abs(run.qpos[-1] - data.qpos).max() < 1e-15
+    assert np.abs(run.qpos[-1] - data.qpos).max() < 1e-14
     for damage in ({"cut": ("no",)}, {"masses": {"no": 1.0}}):
         with pytest.raises(UnknownNameError, match=r"unknown (tendon|body) 'no'"):
             reservoir.alter(**damage)
@@ -503,9 +503,10 @@ def test_every_kind_of_actuator_is_driven_as_by_hand(integrator):
         mujoco.mj_sensorVel(model, data)
         signals = np.r_[data.sensordata[:-1], late]
         outputs = signals @ w_out[:-1] + w_out[-1]
-        assert np.abs(run.qpos[k] - data.qpos).max() < 1e-15
-        assert np.abs(run.signals[k] - signals).max() < 1e-14
-        assert np.abs(run.outputs[k] - outputs).max() < 1e-15
+        # an ulp or none here; sums in another order, as on another processor, grow with the steps
+        assert np.abs(run.qpos[k] - data.qpos).max() < 2e-14
+        assert np.abs(run.signals[k] - signals).max() < 1e-13
+        assert np.abs(run.outputs[k] - outputs).max() < 2e-14
         data.ctrl[:] = (outputs + offset[k]) @ gains
         if integrator == "RK4":
             mujoco.mj_forward(model, data)
