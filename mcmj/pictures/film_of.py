@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 
 from mcmj.pictures.film import Film, ModelFilm
-from mcmj.pictures.rendering import ORBIT_POINTS, Report, Style, write_film
+from mcmj.pictures.rendering import ORBIT_POINTS, Report, write_film
 from mcmj.pictures.video_file import OPTIONS
 from mcmj.simulation.reservoir import Reservoir
 from mcmj.simulation.simulation import Simulation
@@ -58,7 +58,6 @@ def film(
     *,
     target: Target | None = None,
     camera: str | None = None,
-    style: Style | None = None,
 ) -> Report:
     """Write what a reservoir does next as .mp4 or .gif; see `film_of`.
 
@@ -71,4 +70,4 @@ def film(
     if file.suffix not in OPTIONS:
         raise InvalidArgumentError("path", f"a name that ends with {' or '.join(OPTIONS)}", path)
     recorded = film_of(reservoir, seconds, target=target, camera=camera)
-    return write_film(recorded, {file.suffix: file}, style)
+    return write_film(recorded, {file.suffix: file})

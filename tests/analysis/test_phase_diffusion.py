@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import mcmj
+from mcmj.analysis.loops.loop_map import advance
 from mcmj.analysis.stability.basin import on_cycle
 from mcmj.analysis.stability.cycle import Cycle
 from mcmj.analysis.stability.loop import ClosedLoop
@@ -79,7 +80,7 @@ def phase_responses(loop, cycle, channel, moments=48, size=1e-3, rest=4):
     push = np.zeros((2 * moments, 1, loop.body.n_outputs))
     push[:moments, 0, channel], push[moments:, 0, channel] = size, -size
     after = loop.run(np.tile(states, (2, 1)), offset=push).states
-    outputs = loop.run(loop.advance(after, rest * steps), steps).outputs
+    outputs = loop.run(advance(loop, after, rest * steps), steps).outputs
     forward, back = np.split(outputs, 2)
     rates = np.gradient(forward, loop.timestep, axis=1)
     shifts = ((forward - back) * rates).sum(axis=(1, 2)) / (rates**2).sum(axis=(1, 2))

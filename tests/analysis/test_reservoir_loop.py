@@ -10,6 +10,7 @@ from scipy.spatial.transform import Rotation
 
 import mcmj
 from mcmj.analysis.loops.chart import Chart
+from mcmj.analysis.loops.loop_map import advance
 from mcmj.analysis.loops.reservoir_loop import ReservoirLoop
 from mcmj.analysis.stability.basin import kicked, on_cycle, pushed, survey
 from mcmj.analysis.stability.confirm import directional
@@ -179,7 +180,7 @@ def test_a_survey_agrees_with_separate_rollouts(rayleigh):
         assert orbit_error(outputs[-last::10], goal) == pytest.approx(error, abs=1e-9)
         np.testing.assert_array_equal(loop.run(state[None], 25_000).outputs[0], outputs)
     with pytest.raises(DivergenceError, match="copy 3"):
-        loop.advance(states, 1000)
+        advance(loop, states, 1000)
     assert on_cycle(loop, cycle, 3).shape == (3, 2)
     assert np.isfinite(pushed(loop, states[:3], np.full((3, 1), 0.1), 0.5)).all()
 

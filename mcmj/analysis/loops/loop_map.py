@@ -83,14 +83,11 @@ class LoopMap(Protocol):
     def trail(self, state: Array, stride: int, samples: int) -> Array:
         """States (samples, n) every `stride` steps of the undisturbed run from a state (n,)."""
 
-    def advance(self, states: Array, steps: int) -> Array:
-        """States (B, n) after some undisturbed steps (0 or more); a blow-up is an error."""
-
     def refined(self, factor: int) -> Self:
         """The same loop with steps that much smaller."""
 
 
-def advanced(loop: LoopMap, states: Array, steps: int) -> Array:
+def advance(loop: LoopMap, states: Array, steps: int) -> Array:
     """States (B, n) after some undisturbed steps (0 or more).
 
     Raises:

@@ -11,7 +11,7 @@ from typing import Any, Self
 
 import numpy as np
 
-from mcmj.analysis.loops.loop_map import LoopRun, advanced
+from mcmj.analysis.loops.loop_map import LoopRun
 from mcmj.analysis.loops.placed_copies import PlacedCopies
 from mcmj.analysis.loops.symmetries import cyclic_coordinates
 from mcmj.core.readout import Readout
@@ -142,14 +142,6 @@ class ReservoirLoop:
             copies.rollout(max(1, stride), record=())
             states.append(self._vectors(copies))
         return np.concatenate(states)
-
-    def advance(self, states: Array, steps: int) -> Array:
-        """States (B, n) after some undisturbed steps (0 or more).
-
-        Raises:
-            DivergenceError: a copy blew up.
-        """
-        return advanced(self, states, steps)
 
     def refined(self, factor: int) -> Self:
         """The same loop with smaller steps: itself, for a factor of 1.

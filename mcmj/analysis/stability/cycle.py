@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import brentq
 
-from mcmj.analysis.loops.loop_map import LoopMap
+from mcmj.analysis.loops.loop_map import LoopMap, advance
 from mcmj.metrics import orbits
 from mcmj.utils.errors import McmjError
 from mcmj.utils.validation import Array, require_number
@@ -49,9 +49,9 @@ def weights_at(fraction: float) -> Array:
 
 def around(loop: LoopMap, states: Array, steps: int) -> Array:
     """States (4, B, n) after steps - 1, ..., steps + 2 steps."""
-    rows = [loop.advance(states, steps - 1)]
+    rows = [advance(loop, states, steps - 1)]
     for _ in range(3):
-        rows.append(loop.advance(rows[-1], 1))
+        rows.append(advance(loop, rows[-1], 1))
     return np.stack(rows)
 
 
@@ -90,7 +90,7 @@ def find_cycle(
     require_number("guess", guess, 2 * loop.timestep)
     state = np.asarray(start)[None]
     for _ in range(rounds):
-        state = loop.advance(state, max(1, round(settle / loop.timestep)))
+        state = advance(loop, state, max(1, round(settle / loop.timestep)))
         cycle = _cycle_at(loop, state, guess)
         if cycle.residual <= tolerance:
             return cycle
@@ -108,7 +108,7 @@ def _cycle_at(loop: LoopMap, state: Array, guess: float) -> Cycle:
     if np.isnan(rough):
         raise McmjError(f"the loop has no rhythm with a period near {guess:.4g} s")
     steps = round(rough / h) - 1
-    before, here, after = (loop.advance(state, k)[0] for k in range(3))
+    before, here, after = (advance(loop, state, k)[0] for k in range(3))
     tangent = (after - before) / (2 * h)
     scale = loop.scales(loop.trail(state[0], max(1, steps // SAMPLES), SAMPLES))
     normal = tangent / scale**2

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from mcmj.analysis.loops.loop_map import LoopRun, advanced
+from mcmj.analysis.loops.loop_map import LoopRun
 from mcmj.core.body import Body, require_plane, spring_lengths
 from mcmj.core.readout import Readout, checked_readout
 from mcmj.core.rollout_arguments import check_drive
@@ -138,14 +138,6 @@ class ClosedLoop:
             population.run(drive, 0, drive.steps, lengths=False)
             states.append(self._vectors(population))
         return np.concatenate(states)
-
-    def advance(self, states: Array, steps: int) -> Array:
-        """States (B, n) after some undisturbed steps (0 or more).
-
-        Raises:
-            DivergenceError: a copy blew up.
-        """
-        return advanced(self, states, steps)
 
     def refined(self, factor: int) -> "ClosedLoop":
         """The same loop with steps that much smaller."""

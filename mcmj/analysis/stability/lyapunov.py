@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mcmj.analysis.loops.loop_map import LoopMap
+from mcmj.analysis.loops.loop_map import LoopMap, advance
 from mcmj.utils.seeds import stream
 from mcmj.utils.validation import Array, require_count, require_number
 
@@ -70,7 +70,7 @@ def lyapunov_exponent(
     here = np.asarray(state, dtype=np.float64)
     for i in range(transient + intervals):
         apart *= DISTANCE / np.linalg.norm(apart, axis=1, keepdims=True)
-        ends = loop.advance(np.vstack([here, here + apart * units]), steps)
+        ends = advance(loop, np.vstack([here, here + apart * units]), steps)
         here, apart = ends[0], (ends[1:] - ends[0]) / units
         growth[i] = np.log(np.linalg.norm(apart, axis=1) / DISTANCE)
     rates = growth[transient:] / (steps * loop.timestep)

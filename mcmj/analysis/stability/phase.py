@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import cKDTree
 
-from mcmj.analysis.loops.loop_map import LoopMap
+from mcmj.analysis.loops.loop_map import LoopMap, advance
 from mcmj.analysis.stability.cycle import Cycle
 from mcmj.utils.errors import InvalidArgumentError
 from mcmj.utils.seeds import stream
@@ -96,7 +96,7 @@ def phase_diffusion(
         run = loop.run(np.tile(cycle.state, (len(deviations), 1)), offset=offset)
         if not run.alive.all():
             raise InvalidArgumentError("noise", "an amplitude that the cycle survives", noise)
-        gained = phase_of(loop.advance(run.states, quiet))
+        gained = phase_of(advance(loop, run.states, quiet))
         shifts.append((gained + cycle.period / 2) % cycle.period - cycle.period / 2)
     return Diffusion(noise, cycle.period, np.concatenate(shifts))
 

@@ -11,6 +11,7 @@ from mcmj.experiments.benchmark.config import READOUT_SIZE, Config
 from mcmj.simulation.models.adopt import read_spec
 from mcmj.simulation.reservoir import Reservoir
 from mcmj.utils.errors import MissingExtraError
+from mcmj.utils.quiet import untimed
 from mcmj.utils.timing import Work, interleaved_seconds, median_ratio
 
 COPIES = 8
@@ -21,18 +22,23 @@ def model_costs(config: Config, body: object) -> dict[str, object]:
     """Closed loop over bare mj_step of the same model, and two threads against one.
 
     Signals and outputs are recorded. Both start from rest; the readout does next to nothing, so
-    that both make the same motion. Copies record nothing. Models of dm_control's suite are left
-    out where it is not installed.
+    that both make the same motion. Rollouts stop MuJoCo's clock (utils.quiet), a bare mj_step does
+    not; the second ratio is over one that does. Copies record nothing. Models of dm_control's
+    suite are left out where it is not installed.
     """
-    ratios, threads = {}, {}
+    ratios, alike, threads = {}, {}, {}
     for name, adoption in ADOPTIONS.items():
         try:
             spec = read_spec(adoption.load(), adoption.timestep)
         except MissingExtraError:
             continue
-        ratios[name] = _closed_over_bare(config, spec, adoption.sensors)
+        ratios[name], alike[name] = _closed_over_bare(config, spec, adoption.sensors)
         threads[name] = _two_threads(config, spec, adoption.sensors)
-    return {"reservoir_ratio": ratios, "reservoir_threads2_speedup": threads}
+    return {
+        "reservoir_ratio": ratios,
+        "reservoir_ratio_same_clock": alike,
+        "reservoir_threads2_speedup": threads,
+    }
 
 
 def _reservoir(spec: mujoco.MjSpec, sensors: tuple[str, ...], **options: Any) -> Reservoir:
@@ -44,7 +50,10 @@ def _reservoir(spec: mujoco.MjSpec, sensors: tuple[str, ...], **options: Any) ->
     return reservoir
 
 
-def _closed_over_bare(config: Config, spec: mujoco.MjSpec, sensors: tuple[str, ...]) -> float:
+def _closed_over_bare(
+    config: Config, spec: mujoco.MjSpec, sensors: tuple[str, ...]
+) -> tuple[float, float]:
+    """Over mj_step as it is, and with MuJoCo's clock stopped."""
     closed, model = _reservoir(spec, sensors), spec.compile()
     data = mujoco.MjData(model)
 
@@ -52,12 +61,20 @@ def _closed_over_bare(config: Config, spec: mujoco.MjSpec, sensors: tuple[str, .
         mujoco.mj_resetData(model, data)
         mujoco.mj_step(model, data, nstep=config.steps)
 
+    def without_clock() -> None:
+        with untimed():
+            bare()
+
     def loop() -> None:
         closed.reset()
         closed.rollout(config.steps)
 
-    seconds = interleaved_seconds({"closed": loop, "bare": bare}, config.repeats)
-    return median_ratio(seconds, "closed", "bare")
+    works = {"closed": loop, "bare": bare, "without_clock": without_clock}
+    seconds = interleaved_seconds(works, config.repeats)
+    return (
+        median_ratio(seconds, "closed", "bare"),
+        median_ratio(seconds, "closed", "without_clock"),
+    )
 
 
 def _two_threads(config: Config, spec: mujoco.MjSpec, sensors: tuple[str, ...]) -> float:
