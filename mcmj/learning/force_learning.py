@@ -168,8 +168,8 @@ class _Teacher:
         """The teacher drives and a regression learns, with which the simulation then goes on."""
         start, regression = self._stand(stand), Regression(bias=True)
         for stretch in self._stretches(self._learning.warm_up - self._learning.washout, start):
-            run = self._simulation.rollout(offset=stretch.offset, gate=0.0, record=("lengths",))
-            regression.add(run.get("lengths")[:: self._every], stretch.targets)
+            run = self._simulation.rollout(offset=stretch.offset, gate=0.0, record=("signals",))
+            regression.add(run.get("signals")[:: self._every], stretch.targets)
             self._on_steps(len(run))
         learner = learner_after(regression, self._learning.ridge)
         run_corrected(self._simulation, learner, (), every=self._every)  # the readout, for now

@@ -144,18 +144,18 @@ class Course:
             steps = np.arange(start, min(start + CHUNK, total))
             times = step * (first + steps).astype(np.float64)
             clean = lesson.outputs(times)
-            lengths = self._lengths(lesson, times, clean)
+            signals = self._signals(lesson, times, clean)
             every = self._teaching.every
             earliest = -(-max(start, washout) // every) * every
             learned = slice(earliest - start, None, every)
             if earliest < start + len(steps):
                 weight = lesson.weight
                 weights = weight(times[learned]) if callable(weight) else weight
-                regression.add(lengths[learned], clean[learned], weight=weights)
+                regression.add(signals[learned], clean[learned], weight=weights)
             on_steps(len(steps))
 
-    def _lengths(self, lesson: Lesson, times: Array, clean: Array) -> Array:
-        """Lengths (T, L) under the teacher, as the readout sees them."""
+    def _signals(self, lesson: Lesson, times: Array, clean: Array) -> Array:
+        """Signals (T, n_signals) under the teacher, as the readout hears them."""
         noise = self._rest_noise if lesson.elsewhere else self._noise
         noisy = (1.0 - lesson.own_share) * clean
         share = np.broadcast_to(lesson.noise_share, clean.shape[1])
@@ -166,13 +166,13 @@ class Course:
             inputs=None if lesson.inputs is None else lesson.inputs(times),
             offset=noisy,
             gate=lesson.own_share,
-            record=("lengths",),
+            record=("signals",),
         )
-        lengths = run.get("lengths")
+        signals = run.get("signals")
         if self._teaching.length_noise > 0:
-            seen = self._length_noise.standard_normal(lengths.shape)
-            lengths = lengths + self._teaching.length_noise * seen
-        return lengths
+            seen = self._length_noise.standard_normal(signals.shape)
+            signals = signals + self._teaching.length_noise * seen
+        return signals
 
 
 def synchronise(
