@@ -14,9 +14,10 @@ A page names its commands in its front matter, with the figures to keep of each:
     ---
 
 A run leaves docs/data/perturb_seeds.json (its metrics.json) and the figures, in docs/figures.
-What stands between `<!-- commands -->` or `<!-- table RUN [at PATH] ... -->` and `<!-- end -->`
+What stands between `<!-- commands -->` or `<!-- table RUN .. [at PATH] .. -->` and `<!-- end -->`
 is written from these. Rows of a table are templates over the metrics, those after `at PATH` once
-for every entry of the mapping there, whose key is {key}. See `Numbers` for the formats.
+for every entry of the mapping there, whose key is {key}. Of several runs the metrics are
+by name. See `Numbers` for the formats.
 """
 
 import json
@@ -27,6 +28,7 @@ import sys
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from statistics import median
 from string import Formatter
 from typing import Annotated, Any
 
@@ -43,14 +45,19 @@ _BLOCK = re.compile(
 
 class Numbers(Formatter):
     """Formats of templates: `.3` digits as Python's, `p2` percent and `n2` a number, both with so
-    many significant digits, `name` a name in words; what is not finite is a dash."""
+    many significant digits, `name` a name in words. Of a list it is the median; what is not finite
+    is a dash."""
 
     def get_value(self, key: int | str, args: Any, kwargs: Any) -> Any:
         return kwargs[str(key)]
 
     def format_field(self, value: Any, format_spec: str) -> str:
+        if isinstance(value, list):
+            value = median([one for one in value if one is not None] or [float("nan")])
         if value is None:
-            return "–"
+            return "-"
+        if isinstance(value, bool):
+            return "yes" if value else "no"
         if format_spec == "name":
             return NAMES.get(str(value), str(value).replace("_", " "))
         if format_spec[:1] in ("p", "n"):
@@ -101,7 +108,14 @@ class Run:
             sys.exit(f"docs: {self.name} failed")
         shutil.copyfile(out / "metrics.json", self.data)
         for figure in self.figures:
-            shutil.copyfile(out / figure, DOCS / "figures" / f"{self.name}_{figure}")
+            shutil.copyfile(out / figure, DOCS / "figures" / self.kept(figure))
+
+    def kept(self, figure: str) -> str:
+        """The name of a figure in docs/figures: with the run's, unless one begins or ends so."""
+        if figure.startswith(self.name):
+            return figure
+        path = Path(figure)
+        return self.name + path.suffix if self.name.endswith(path.stem) else f"{self.name}_{figure}"
 
 
 def runs_of(text: str) -> list[Run]:
@@ -132,15 +146,21 @@ def filled(text: str) -> str:
 def _table(asked: str) -> Iterator[str]:
     """Lines of a table; `asked` is what stands in its comment after the word table."""
     first, *lines = asked.strip().splitlines()
-    name, _, path = first.strip().partition(" at ")
+    names, _, path = first.strip().partition(" at ")
     header, *templates = [line.strip() for line in lines]
-    text = (DOCS / "data" / f"{name}.json").read_text(encoding="utf-8")
-    metrics = json.loads(text, object_pairs_hook=_Metrics)["metrics"]
+    found = {name: _metrics_of(name) for name in names.split()}
+    metrics = found if len(found) > 1 else found[names]
     yield header
     yield "|" + " --- |" * (header.count("|") - 1)
     for values in _rows(metrics, path):
         for template in templates:
             yield Numbers().vformat(template, (), values)
+
+
+def _metrics_of(name: str) -> dict[str, Any]:
+    text = (DOCS / "data" / f"{name}.json").read_text(encoding="utf-8")
+    metrics: dict[str, Any] = json.loads(text, object_pairs_hook=_Metrics)["metrics"]
+    return metrics
 
 
 def _rows(metrics: Mapping[str, Any], path: str) -> Iterator[Mapping[str, Any]]:
