@@ -1,0 +1,59 @@
+"""The command: design."""
+
+from pathlib import Path
+
+from rich.console import Console
+
+from mcmj.experiments.base import Experiment, table_of
+from mcmj.experiments.design.config import Config
+from mcmj.experiments.design.figure import figures
+from mcmj.experiments.design.result import KINDS, Designs, Result
+from mcmj.experiments.design.run import OnBody, run, total_bodies
+from mcmj.utils import files
+from mcmj.utils.progress import trial_bar
+
+
+def resume(config: Config, folder: Path, on_steps: OnBody) -> Result:
+    """The designs; their store is in the folder, if the config names none."""
+    return run(config, store=folder / "trials.sqlite", on_body=on_steps)
+
+
+def write(result: Result, folder: Path) -> None:
+    """The best designed body, and the smallest, each with its readout."""
+    for name, xml in result.champions.items():
+        files.write_text(folder / f"{name}.xml", xml)
+
+
+def show(result: Result, console: Console) -> None:
+    """The result as tables."""
+    config = result.config
+    columns = ("nodes", "random", "random search", "designed", "bodies tried", "seconds a body")
+    title = f"{config.task}: bodies below {100 * config.threshold:g} % under unseen noise"
+    table = table_of(title, *columns, words=0)
+    rows = {**result.sizes}
+    if result.bodies is not None:
+        rows[config.settings.nodes] = result.bodies
+    for nodes, found in sorted(rows.items()):
+        table.add_row(str(nodes), *_cells(found))
+    console.print(table)
+
+
+def _cells(found: Designs) -> list[str]:
+    total = len(found.bodies)
+    tried = sorted(found.evaluations)
+    seconds = sum(body["seconds"] for body in found.bodies) / total
+    counts = [f"{found.successes(kind)} of {total}" for kind in KINDS]
+    return [*counts, f"{tried[0]} to {tried[-1]}", f"{seconds:.1f}"]
+
+
+EXPERIMENT = Experiment(
+    name="design",
+    config=Config,
+    run=resume,
+    show=show,
+    bar=lambda config, quiet: trial_bar("bodies", total_bodies(config), quiet=quiet),
+    write=write,
+    figures=figures,
+    needs_folder=True,
+    resumes=True,
+)

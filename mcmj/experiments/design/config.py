@@ -1,0 +1,75 @@
+"""What `design` runs: its Config, and the trials that it asks for."""
+
+from dataclasses import dataclass, fields, replace
+from pathlib import Path
+from typing import Annotated
+
+import tyro
+
+from mcmj.experiments.design import one_body
+from mcmj.search.experiment import Trial
+from mcmj.search.space import MAX_SEED
+from mcmj.utils.validation import require_count, require_names
+
+PARTS = ("bodies", "smallest")
+TRIAL = "mcmj.experiments.design.one_body"  # the experiment that a trial is
+
+
+@dataclass(frozen=True)
+class Config(one_body.Config):
+    """What to design.
+
+    Attributes:
+        task: van_der_pol, quadratic, lissajous, a gait, a .csv file, package.module:function; or
+            input_driven: three rhythms chosen by an input.
+        nodes: number of masses of the part bodies; default: as many as leave random bodies room
+            to fail.
+        seed: of the first body; its proposals and the noise of its search have the same.
+        seeds: number of bodies, of consecutive seeds.
+        parts: bodies: one from each random body; smallest: the same with every number of nodes
+            of sizes.
+        sizes: numbers of nodes of the part smallest.
+        varied: what may differ from the random body: springs, rest_lengths, positions, masses,
+            feedback (mcmj.search.body_space).
+        evaluations: at most so many bodies are tried for each.
+        spread: standard deviation of the first proposals, in units of body_space.
+        aim: a body is taken when its orbit error is below this with every noise of the checks.
+        checks: number of noise seeds, not the search's, that a body must pass to be taken.
+        threshold: largest orbit error of a success.
+        judged: number of noise seeds, not those of search or checks, that it is judged with.
+        free_run: from total rest, its last 20 s are judged [s].
+        teaching: how the readout is taught; input_driven has its own way.
+        workers: processes, one thread each; default: one a core.
+        store: file that keeps what is finished; default: trials.sqlite in the output folder.
+    """
+
+    seed: Annotated[int, tyro.conf.arg(aliases=["--first-seed"])] = 0
+    seeds: int = 10
+    parts: tuple[str, ...] = ("bodies",)
+    sizes: tuple[int, ...] = (3, 4, 5, 6, 8, 10)
+    workers: int | None = None
+    store: Path | None = None
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        require_count("seeds", self.seeds, 1)
+        require_count("seed", self.seed, 0, MAX_SEED - self.seeds)
+        require_names("part", self.parts, PARTS)
+        if self.workers is not None:
+            require_count("workers", self.workers, 1)
+        self.trials  # noqa: B018  builds, so checks, the configs of all of them
+
+    @property
+    def trials(self) -> dict[str, dict[int, list[Trial]]]:
+        """By part and number of nodes: one for each seed."""
+        usual = self.settings.nodes
+        found = {"bodies": {usual: self._of(usual)}}
+        found["smallest"] = {nodes: self._of(nodes) for nodes in self.sizes}
+        return {part: found[part] for part in self.parts}
+
+    def _of(self, nodes: int) -> list[Trial]:
+        names = [field.name for field in fields(one_body.Config)]
+        one = one_body.Config(**{name: getattr(self, name) for name in names})
+        return [
+            Trial(TRIAL, replace(one, nodes=nodes, seed=self.seed + k)) for k in range(self.seeds)
+        ]

@@ -1,0 +1,78 @@
+"""Designed bodies beside random ones: errors, bodies tried, numbers of nodes, the best body."""
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from mcmj.experiments.design.result import KINDS, Designs, Result
+from mcmj.experiments.search.figure import draw_scores
+from mcmj.metrics.success_rates import wilson_interval
+from mcmj.mjcf.read import from_mjcf
+from mcmj.pictures.plotting import TITLES, count_in_whole_numbers, new_figure, plot_body
+from mcmj.search.experiment import Score
+from mcmj.utils.colours import BLACK, BLUE, GREY
+
+COLOURS = {"random": GREY, "search": BLUE, "designed": BLACK}
+
+
+def figures(result: Result) -> dict[str, Figure]:
+    """By file name."""
+    found = {}
+    if result.bodies is not None:
+        found["design"] = design_figure(result, result.bodies)
+    if result.sizes:
+        found["smallest"] = smallest_figure(result)
+    return found
+
+
+def design_figure(result: Result, designs: Designs) -> Figure:
+    """Orbit errors, how many bodies were tried, and the best body, if there is one."""
+    xml = result.champions.get("designed")
+    figure = new_figure(15.0 if xml else 10.5, 4.6)
+    axes = figure.subplots(1, 3 if xml else 2)
+    score = Score("orbit error, worst of all noises", designs.threshold)
+    draw_scores(axes[0], {KINDS[kind]: designs.errors(kind) for kind in KINDS}, score)
+    axes[0].set_title(f"{_title(result)}, {result.config.settings.nodes} nodes")
+    _draw_tried(axes[1], designs)
+    if xml:
+        plot_body(axes[2], from_mjcf(xml)[0])
+        axes[2].set_title("The best designed body")
+    return figure
+
+
+def _draw_tried(axes: Axes, designs: Designs) -> None:
+    """Share of the bodies that passed the checks, against bodies tried for each."""
+    tried = np.array(designs.evaluations)
+    passed = np.sort(tried[[body["passed"] for body in designs.bodies]])
+    share = np.arange(1, len(passed) + 1) / len(tried)
+    axes.step([*passed, tried.max()], [*share, len(passed) / len(tried)], where="post", color=BLACK)
+    axes.set(xlabel="bodies tried", ylabel="share of the designs that passed", ylim=(0, 1.02))
+    axes.set_title("until one passes its checks")
+    count_in_whole_numbers(axes)
+    axes.grid(alpha=0.3)
+
+
+def smallest_figure(result: Result) -> Figure:
+    """Share of the bodies that learn the task against the number of nodes."""
+    figure = new_figure(6.0, 4.2)
+    axes = figure.subplots()
+    nodes = np.array(list(result.sizes))
+    for kind, label in KINDS.items():
+        counts = [(found.successes(kind), len(found.bodies)) for found in result.sizes.values()]
+        rates = np.array([count / total for count, total in counts])
+        spans = np.abs(np.array([wilson_interval(*pair) for pair in counts]).T - rates)
+        shift = 0.08 * (list(KINDS).index(kind) - 1)  # bars side by side
+        axes.errorbar(
+            nodes + shift, rates, yerr=spans, fmt="o-", ms=5, capsize=3, color=COLOURS[kind],
+            label=label,
+        )  # fmt: skip
+    axes.set(xlabel="nodes", ylabel="share of the bodies that learn it", ylim=(-0.03, 1.03))
+    axes.set_title(_title(result))
+    axes.legend(frameon=False)
+    axes.grid(alpha=0.3)
+    count_in_whole_numbers(axes)
+    return figure
+
+
+def _title(result: Result) -> str:
+    return TITLES.get(result.config.task, result.config.task.replace("_", " "))

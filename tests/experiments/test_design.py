@@ -1,0 +1,112 @@
+"""Designed bodies: what passes is confirmed from outside, and nothing depends on the way there."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import mcmj
+from mcmj.experiments.design import one_body
+from mcmj.experiments.design.config import Config
+from mcmj.experiments.design.judges import Tried
+from mcmj.experiments.design.run import run
+from mcmj.learning.lessons import Teaching
+from mcmj.metrics.orbits import orbit_error
+from mcmj.mjcf.bundled import open_body
+from mcmj.reference.integration import integrate_smooth
+from mcmj.search.body_space import BodySpace
+from mcmj.utils.errors import InvalidArgumentError, UnknownNameError
+
+SHORT = Teaching(duration=20.0, washout=5.0)
+TINY = one_body.Config(
+    nodes=6, evaluations=4, checks=1, judged=1, free_run=26.0, teaching=SHORT
+)  # fmt: skip
+LEARNS = replace(TINY, nodes=10, seed=21, free_run=60.0, teaching=Teaching())  # as it is drawn
+
+
+def without_times(metrics):
+    return {key: value for key, value in metrics.items() if key != "seconds"}
+
+
+def test_a_seed_gives_the_same_bits():
+    one, two = (without_times(one_body.run(TINY).metrics) for _ in range(2))
+    assert one == two
+    other = one_body.run(replace(TINY, seed=1)).metrics
+    assert other["designed"] != one["designed"]
+
+
+def test_a_search_at_random_tries_no_more_bodies_and_begins_with_the_same():
+    result = one_body.run(TINY)
+    assert result.hunt.tried == TINY.evaluations
+    assert result.found.tried <= result.hunt.tried
+    assert result.found.scores[0] == result.hunt.scores[0]
+    assert result.found.scores[1] != result.hunt.scores[1]
+    assert min(result.hunt.scores) <= result.hunt.scores[0]
+
+
+def test_a_body_that_learns_as_it_is_drawn_is_left_alone():
+    result = one_body.run(LEARNS)
+    assert result.hunt.passed
+    assert result.hunt.tried == 1
+    assert result.body == mcmj.random_body(21, nodes=10)
+    assert result.verdicts["random"].metrics == result.verdicts["designed"].metrics
+    assert max(result.verdicts["designed"].errors) < 0.01
+    assert result.mujoco.worst == pytest.approx(result.verdicts["designed"].errors[0], rel=1e-3)
+    assert result.exact == pytest.approx(result.verdicts["designed"].errors[0], rel=0.1)
+
+
+def test_what_is_finished_is_kept_and_gone_on_from(tmp_path):
+    config = Config(**{**vars_of(TINY), "seeds": 2}, workers=1)
+    whole = run(config, store=tmp_path / "whole")
+    run(replace(config, seeds=1), store=tmp_path / "half")  # as one killed after its first body
+    told = []
+    halves = run(config, store=tmp_path / "half", on_body=told.append)
+    assert len(told) == 2
+    for one, two in zip(whole.bodies.bodies, halves.bodies.bodies, strict=True):
+        assert without_times(one) == without_times(two)
+    again = run(config, store=tmp_path / "half")
+    assert again.bodies == halves.bodies  # times too: nothing was run again
+
+
+def vars_of(config):
+    return {name: getattr(config, name) for name in one_body.Config.__dataclass_fields__}
+
+
+def test_scores_of_bodies_that_blow_up_or_leave_are_in_order():
+    errors = [(0.01,), (0.2,), (2.0,), (np.inf,)]
+    scores = [Tried(some).score for some in errors]
+    assert scores == sorted(scores)
+    assert np.isfinite(scores).all()
+    assert Tried((0.01, np.inf)).worst == np.inf
+    assert Tried((0.01, np.inf)).score < Tried((0.1, np.inf)).score
+
+
+def test_bad_configs():
+    with pytest.raises(UnknownNameError, match="unknown task 'waltz'"):
+        Config(task="waltz")
+    with pytest.raises(InvalidArgumentError, match="aim: expected at most the threshold"):
+        Config(aim=0.1)
+    with pytest.raises(UnknownNameError, match="part"):
+        Config(parts=("head",))
+    with pytest.raises(InvalidArgumentError, match="nodes"):
+        Config(parts=("smallest",), sizes=(2,))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("task", "nodes", "seed"), [("van_der_pol", 10, 0), ("lissajous", 15, 0)])
+def test_a_body_that_failed_is_designed_and_confirmed_from_outside(task, nodes, seed, tmp_path):
+    result = one_body.run(one_body.Config(task=task, nodes=nodes, seed=seed))
+    assert not result.verdicts["random"].success
+    assert result.verdicts["designed"].success
+    path = tmp_path / "designed.xml"
+    path.write_text(result.xml)
+    stored, goal = open_body(str(path)), mcmj.target(task)
+    drawn = mcmj.random_body(seed, nodes=nodes)
+    x = stored.provenance["x"]
+    assert stored.body == BodySpace(drawn, stored.provenance["varied"]).body(np.array(x))
+    assert (stored.body.springs == drawn.springs).all()
+    sim = mcmj.Simulation(stored.body, w_out=stored.w_out, **stored.settings)  # MuJoCo, from rest
+    sim.rollout(40_000, record=())
+    assert orbit_error(sim.rollout(20_000).outputs, goal) < 0.05
+    exact = integrate_smooth(stored.body, steps=60_000, w_out=stored.w_out, rtol=1e-7)
+    assert orbit_error(exact.outputs[-20_000:], goal) < 0.05
