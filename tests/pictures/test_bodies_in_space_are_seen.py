@@ -10,7 +10,7 @@ from mcmj.mjcf.appearance import CAMERA_ANGLE, camera_of, node_colour
 from mcmj.mjcf.read import load_model
 from mcmj.pictures.film import Film
 from mcmj.pictures.opengl import RenderingUnavailableError
-from mcmj.pictures.plotting import new_figure, draw_network
+from mcmj.pictures.plotting import draw_network, new_figure
 from mcmj.pictures.rendering import HEIGHT, WIDTH, Style, body_view, film_frames
 from mcmj.utils.colours import strain_colours
 

@@ -9,11 +9,11 @@ from mcmj.pictures.plotting import (
     TITLES,
     best_phase,
     count_in_whole_numbers,
+    draw_network,
     draw_outputs,
     draw_phase_plane,
     new_figure,
     output_handles,
-    draw_network,
 )
 from mcmj.utils.colours import GROUP_COLOURS, TARGET_COLOUR
 

@@ -6,7 +6,7 @@ from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 
 from mcmj.experiments.prune.result import Result
-from mcmj.pictures.plotting import new_figure, draw_network
+from mcmj.pictures.plotting import draw_network, new_figure
 from mcmj.utils.colours import GROUP_COLOURS, TARGET_COLOUR
 
 ORDERS = {

@@ -12,7 +12,7 @@ from matplotlib.ticker import LogLocator, NullFormatter
 
 from mcmj.experiments.search.result import Result, setting_label
 from mcmj.mjcf.read import from_mjcf
-from mcmj.pictures.plotting import TITLES, count_in_whole_numbers, new_figure, draw_network
+from mcmj.pictures.plotting import TITLES, count_in_whole_numbers, draw_network, new_figure
 from mcmj.search.experiment import Score
 from mcmj.utils.colours import GROUP_COLOURS, TARGET_COLOUR
 from mcmj.utils.validation import Array
