@@ -6,10 +6,13 @@ import numpy as np
 import pytest
 
 import mcmj
+from mcmj.analysis.promise import linear_measures
 from mcmj.experiments.design import one_body
 from mcmj.experiments.design.config import Config
-from mcmj.experiments.design.judges import Tried
+from mcmj.experiments.design.judges import InputDriven, Tried
 from mcmj.experiments.design.run import run
+from mcmj.experiments.input_driven import run as input_driven
+from mcmj.experiments.input_driven.config import DRAWN
 from mcmj.learning.lessons import Teaching
 from mcmj.metrics.orbits import orbit_error
 from mcmj.mjcf.bundled import open_body
@@ -17,6 +20,7 @@ from mcmj.reference.integration import integrate_smooth
 from mcmj.search.body_space import BodySpace
 from mcmj.utils.errors import InvalidArgumentError, UnknownNameError
 
+GOAL = mcmj.target("van_der_pol")
 SHORT = Teaching(duration=20.0, washout=5.0)
 TINY = one_body.Config(
     nodes=6, evaluations=4, checks=1, judged=1, free_run=26.0, teaching=SHORT
@@ -70,6 +74,38 @@ def test_what_is_finished_is_kept_and_gone_on_from(tmp_path):
 
 def vars_of(config):
     return {name: getattr(config, name) for name in one_body.Config.__dataclass_fields__}
+
+
+def test_measures_before_teaching_meet_what_was_learned(tmp_path):
+    config = Config(parts=("predictors",), nodes=6, measured=12, teaching=SHORT, workers=1)
+    found = run(config, store=tmp_path / "store").metrics["predictors"]["van_der_pol"]
+    assert found["of"] == 12
+    bodies = [mcmj.random_body(seed, nodes=6) for seed in range(12)]
+    good = np.array([learned(body, seed) for seed, body in enumerate(bodies)])
+    assert found["successes"] == good.sum()
+    if 0 < good.sum() < 12:
+        gains = np.array([linear_measures(body, GOAL.period)["gain"] for body in bodies])
+        order = np.mean([a > b for a in gains[good] for b in gains[~good]])
+        assert found["auc"]["gain"] == pytest.approx(order)
+
+
+def learned(body, seed):
+    """Taught, then from total rest: by the library's own functions."""
+    sim = mcmj.Simulation(body, engine="twin")
+    mcmj.teach(sim, GOAL, SHORT, seed=seed)
+    sim.reset()
+    return orbit_error(sim.rollout(60_000).outputs[-20_000:], GOAL) < 0.05
+
+
+@pytest.mark.slow
+def test_input_driven_bodies_are_judged_as_by_their_experiment():
+    config = replace(InputDriven().config, inputs=(1.0,), settings=replace(DRAWN, nodes=15))
+    config = replace(config, practice=replace(config.practice, rounds=0))
+    body = mcmj.random_body(1, **vars(config.settings))
+    found = InputDriven(config).full(body, 1)
+    theirs = input_driven.run(replace(config, seed=1))
+    assert found.errors == tuple(theirs.outcomes[0].orbit_errors.values())
+    assert (found.w_out == theirs.first.w_out).all()
 
 
 def test_scores_of_bodies_that_blow_up_or_leave_are_in_order():

@@ -35,7 +35,14 @@ def show(result: Result, console: Console) -> None:
         rows[config.settings.nodes] = result.bodies
     for nodes, found in sorted(rows.items()):
         table.add_row(str(nodes), *_cells(found))
-    console.print(table)
+    if rows:
+        console.print(table)
+    if result.predictors is not None:
+        areas = result.predictors.held_out
+        table = table_of("what tells beforehand", "measure before teaching", "area, held out")
+        for name, area in sorted(areas.items(), key=lambda item: -item[1]):
+            table.add_row(name.replace("_", " "), f"{area:.2f}")
+        console.print(table)
 
 
 def _cells(found: Designs) -> list[str]:

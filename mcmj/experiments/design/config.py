@@ -6,13 +6,14 @@ from typing import Annotated
 
 import tyro
 
-from mcmj.experiments.design import one_body
+from mcmj.experiments.design import measured, one_body
 from mcmj.search.experiment import Trial
-from mcmj.search.space import MAX_SEED
+from mcmj.search.space import MAX_SEED, MAX_TRIALS
 from mcmj.utils.validation import require_count, require_names
 
-PARTS = ("bodies", "smallest")
-TRIAL = "mcmj.experiments.design.one_body"  # the experiment that a trial is
+PARTS = ("bodies", "smallest", "predictors")
+DESIGN = "mcmj.experiments.design.one_body"  # the experiments that trials are
+MEASURE = "mcmj.experiments.design.measured"
 
 
 @dataclass(frozen=True)
@@ -27,8 +28,10 @@ class Config(one_body.Config):
         seed: of the first body; its proposals and the noise of its search have the same.
         seeds: number of bodies, of consecutive seeds.
         parts: bodies: one from each random body; smallest: the same with every number of nodes
-            of sizes.
+            of sizes; predictors: which measure of a random body before teaching tells whether
+            it will learn.
         sizes: numbers of nodes of the part smallest.
+        measured: number of random bodies of the part predictors.
         varied: what may differ from the random body: springs, rest_lengths, positions, masses,
             feedback (mcmj.search.body_space).
         evaluations: at most so many bodies are tried for each.
@@ -47,6 +50,7 @@ class Config(one_body.Config):
     seeds: int = 10
     parts: tuple[str, ...] = ("bodies",)
     sizes: tuple[int, ...] = (3, 4, 5, 6, 8, 10)
+    measured: int = 1000
     workers: int | None = None
     store: Path | None = None
 
@@ -57,19 +61,28 @@ class Config(one_body.Config):
         require_names("part", self.parts, PARTS)
         if self.workers is not None:
             require_count("workers", self.workers, 1)
-        self.trials  # noqa: B018  builds, so checks, the configs of all of them
+        require_count("measured", self.measured, 10, MAX_TRIALS)
+        self.trials, self.measurements  # noqa: B018  builds, so checks, the configs of all of them
 
     @property
     def trials(self) -> dict[str, dict[int, list[Trial]]]:
-        """By part and number of nodes: one for each seed."""
+        """Designs by part and number of nodes: one for each seed."""
         usual = self.settings.nodes
         found = {"bodies": {usual: self._of(usual)}}
         found["smallest"] = {nodes: self._of(nodes) for nodes in self.sizes}
-        return {part: found[part] for part in self.parts}
+        return {part: found[part] for part in self.parts if part in found}
+
+    @property
+    def measurements(self) -> list[Trial]:
+        """Of the part predictors."""
+        if "predictors" not in self.parts:
+            return []
+        one = measured.Config(self.task, self.settings.nodes, teaching=self.teaching)
+        return [Trial(MEASURE, replace(one, seed=self.seed + k)) for k in range(self.measured)]
 
     def _of(self, nodes: int) -> list[Trial]:
         names = [field.name for field in fields(one_body.Config)]
         one = one_body.Config(**{name: getattr(self, name) for name in names})
         return [
-            Trial(TRIAL, replace(one, nodes=nodes, seed=self.seed + k)) for k in range(self.seeds)
+            Trial(DESIGN, replace(one, nodes=nodes, seed=self.seed + k)) for k in range(self.seeds)
         ]

@@ -4,15 +4,16 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from mcmj.experiments.design.predictors import TOGETHER, Predictors
 from mcmj.experiments.design.result import KINDS, Designs, Result
 from mcmj.experiments.search.figure import draw_scores
 from mcmj.metrics.success_rates import wilson_interval
 from mcmj.mjcf.read import from_mjcf
-from mcmj.pictures.plotting import TITLES, count_in_whole_numbers, new_figure, plot_body
+from mcmj.pictures.plotting import TITLES, count_in_whole_numbers, draw_network, new_figure
 from mcmj.search.experiment import Score
-from mcmj.utils.colours import BLACK, BLUE, GREY
+from mcmj.utils.colours import BLACK, BLUE, GROUP_COLOURS, RED
 
-COLOURS = {"random": GREY, "search": BLUE, "designed": BLACK}
+COLOURS = dict(zip(KINDS, GROUP_COLOURS, strict=True))
 
 
 def figures(result: Result) -> dict[str, Figure]:
@@ -22,6 +23,8 @@ def figures(result: Result) -> dict[str, Figure]:
         found["design"] = design_figure(result, result.bodies)
     if result.sizes:
         found["smallest"] = smallest_figure(result)
+    if result.predictors is not None:
+        found["predictors"] = predictors_figure(result, result.predictors)
     return found
 
 
@@ -35,7 +38,7 @@ def design_figure(result: Result, designs: Designs) -> Figure:
     axes[0].set_title(f"{_title(result)}, {result.config.settings.nodes} nodes")
     _draw_tried(axes[1], designs)
     if xml:
-        plot_body(axes[2], from_mjcf(xml)[0])
+        draw_network(axes[2], from_mjcf(xml)[0])
         axes[2].set_title("The best designed body")
     return figure
 
@@ -71,6 +74,22 @@ def smallest_figure(result: Result) -> Figure:
     axes.legend(frameon=False)
     axes.grid(alpha=0.3)
     count_in_whole_numbers(axes)
+    return figure
+
+
+def predictors_figure(result: Result, predictors: Predictors) -> Figure:
+    """How well each measure of a body before teaching tells whether it will learn."""
+    figure = new_figure(7.5, 4.6)
+    axes = figure.subplots()
+    areas = sorted(predictors.held_out.items(), key=lambda item: item[1])
+    names = [name.replace("_", " ") for name, _ in areas]
+    colours = [RED if name == TOGETHER else BLUE for name, _ in areas]
+    axes.barh(names, [area for _, area in areas], color=colours, height=0.6)
+    axes.axvline(0.5, color=BLACK, ls="--", lw=1)
+    axes.set(xlabel="area under the ROC curve, held-out bodies (0.5: tells nothing)", xlim=(0.3, 1))
+    count = predictors.successes
+    axes.set_title(f"{_title(result)}: {count} of {len(predictors.bodies)} random bodies learn it")
+    axes.grid(alpha=0.3, axis="x")
     return figure
 
 

@@ -108,7 +108,7 @@ class LimitCycle:
         found = or_lost(
             lambda: integrate_smooth(body, steps=steps, w_out=w_out, rtol=EXACT_RTOL), None
         )
-        return np.inf if found is None else self._error(found.outputs)
+        return np.inf if found is None else self._error(found.get("outputs"))
 
     def _try(self, body: Body, seed: int, teaching: Teaching, run: float, engine: str) -> Tried:
         simulation = Simulation(body, engine=engine)

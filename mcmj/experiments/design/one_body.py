@@ -55,7 +55,7 @@ class Config:
     evaluations: int = 400
     spread: float = 0.5
     aim: float = 0.03
-    checks: int = 3
+    checks: int = 8
     threshold: float = 0.05
     judged: int = 3
     free_run: float = 300.0
@@ -173,7 +173,7 @@ class Verdict:
     """What a body is worth, under noise that no search has seen.
 
     Attributes:
-        errors: the worst orbit error with each noise seed.
+        errors: the worst orbit error with each noise seed, up to the first that is too large.
         readout: of the first of them.
     """
 
@@ -194,8 +194,11 @@ class Verdict:
 
 def judged(config: Config, body: Body) -> Verdict:
     """A body on trial."""
-    seeds = range(JUDGED_FROM, JUDGED_FROM + config.judged)
-    found = [config.judge.full(body, seed) for seed in seeds]
+    found: list[Tried] = []
+    for seed in range(JUDGED_FROM, JUDGED_FROM + config.judged):
+        found.append(config.judge.full(body, seed))
+        if found[-1].worst >= config.threshold:
+            break
     return Verdict([one.worst for one in found], found[0].w_out, config.threshold)
 
 
@@ -271,7 +274,11 @@ def run(config: Config) -> Result:
     seconds = time.perf_counter() - begin
     found = search(config, hunt.tried)
     bodies = {"random": config.drawn, "designed": hunt.best, "search": found.best}
-    verdicts = {name: judged(config, body) for name, body in bodies.items()}
+    known: dict[int, Verdict] = {}  # by body: all three may be the drawn one
+    for body in bodies.values():
+        if id(body) not in known:
+            known[id(body)] = judged(config, body)
+    verdicts = {name: known[id(body)] for name, body in bodies.items()}
     designed = verdicts["designed"]
     exact = None
     if designed.success and designed.readout is not None:

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from mcmj.experiments.design.config import Config
+from mcmj.experiments.design.predictors import Predictors
 from mcmj.metrics.success_rates import success_rate
 from mcmj.utils.validation import Array
 
@@ -70,10 +71,11 @@ class Designs:
 
 @dataclass(frozen=True)
 class Result:
-    """Designs by part and number of nodes."""
+    """Designs by part and number of nodes, and what tells success beforehand."""
 
     config: Config
     designs: dict[str, dict[int, Designs]]
+    predictors: Predictors | None
 
     @property
     def bodies(self) -> Designs | None:
@@ -111,6 +113,8 @@ class Result:
             fewest = {kind: self.smallest(kind) for kind in KINDS}
             by_nodes = {str(n): found.metrics for n, found in self.sizes.items()}
             table["smallest"] = {task: {**fewest, "by_nodes": by_nodes}}
+        if self.predictors is not None:
+            table["predictors"] = {task: self.predictors.metrics}
         return table
 
 
