@@ -55,7 +55,7 @@ INTEGRATORS = {
 }
 TWINS = {row.twin: row for row in INTEGRATORS.values() if row.twin}
 TWINNED = {row.name: row for row in TWINS.values()}
-DEFAULT_INTEGRATOR = "Euler"
+DEFAULT_INTEGRATOR = "leapfrog"
 
 
 def integrator_named(
