@@ -11,7 +11,6 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from statistics import median
 
-import mediapy
 import numpy as np
 from PIL import Image
 
@@ -22,7 +21,7 @@ from mcmj.pictures.flat_view import FlatView
 from mcmj.pictures.model_view import ModelView
 from mcmj.pictures.opengl import RenderingUnavailableError
 from mcmj.pictures.opengl_view import GLView
-from mcmj.pictures.video_file import Picture, new_video
+from mcmj.pictures.video_file import Picture, Video, new_video
 from mcmj.targets.limit_cycles import Target
 from mcmj.utils.errors import InvalidArgumentError, UnknownNameError
 from mcmj.utils.files import whole_file
@@ -231,7 +230,7 @@ def limit_cycle_video(
     write_film(film, {".mp4": Path(path)})
 
 
-def _video(path: Path, fps: float, share: int) -> AbstractContextManager[mediapy.VideoWriter]:
+def _video(path: Path, fps: float, share: int) -> AbstractContextManager[Video]:
     """A video file of frames `share` times smaller, and so many times fewer."""
     return new_video(path, (WIDTH + PANEL_WIDTH) // share, HEIGHT // share, fps=fps / share)
 
