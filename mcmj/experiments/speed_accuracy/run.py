@@ -37,7 +37,7 @@ def run(config: Config, *, on_steps: OnSteps = lambda steps: None) -> Result:
     for name in config.bodies:
         cells[name], consistency[name] = _run_body(config, BODIES[name](config.seed))
         on_steps(1)
-    orders = {m: observed_order(cells, m) for m in config.methods}
+    orders = {m: None if adaptive(m) else observed_order(cells, m) for m in config.methods}
     attractor = {}
     if config.attractor:
         attractor = attractor_errors(from_mjcf(body_path("general"))[0], seed=0)
