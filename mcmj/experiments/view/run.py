@@ -6,8 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from mcmj.core.body import Body
+from mcmj.experiments.body_source import readouts_of
 from mcmj.learning.lessons import Teaching
-from mcmj.learning.teaching import synchronise, teach
+from mcmj.learning.teaching import synchronise
 from mcmj.metrics import orbits
 from mcmj.mjcf.bundled import open_body
 from mcmj.pictures.film import deformation_scale
@@ -151,17 +152,9 @@ def _window(config: Config) -> tuple[Viewer, LiveLoop]:
 
 
 def _body_and_readouts(config: Config) -> tuple[Body, dict[str, Array]]:
-    """The file's readouts by name; taught ones if it has none."""
     stored = open_body(config.body)
     stored.take()
-    body, readouts = stored.body, stored.readouts
-    if not readouts and stored.w_out is not None:
-        return body, {"readout": stored.w_out}
-    if not readouts:
-        for name in TARGETS:
-            simulation = Simulation(body, engine="twin")
-            readouts[name] = teach(simulation, target(name), Teaching(), config.seed).w_out
-    return body, readouts
+    return stored.body, readouts_of(stored, config.seed, engine="twin")
 
 
 def _start(body: Body, name: str, w_out: Array) -> tuple[Simulation, float]:
