@@ -196,7 +196,7 @@ def test_targets_starts_and_sliders_are_those_of_the_file():
     (readout,) = scene.readouts
     goal = mcmj.target("quadratic")
     assert len(readout.orbits) == 1
-    assert orbit_distances(scene.outputs, goal).max() < 0.05
+    assert orbit_distances(readout.outputs, goal).max() < 0.05
     assert scene.stops == []
 
 

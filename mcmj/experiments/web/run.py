@@ -1,7 +1,7 @@
 """From a body file to a page: readouts, where they start, trial runs, a run to check with."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -81,16 +81,20 @@ def scene_of(config: Config) -> Scene:
     options, note = _options(stored)
     readouts = _chosen_first(readouts_of(stored, config.seed, **vars(options)), config.readout)
     stops = _stops(stored)
-    shown = [_shown(stored, options, name, rows, stops) for name, rows in readouts.items()]
-    trials = [t for one in shown for t in _trials(stored, options, one, stops)]
+    shown, positions = [], []
+    for name, rows in readouts.items():
+        start = _start(stored, options, name, rows, stops)
+        trials = _trials(stored, options, start, stops)
+        outputs = np.concatenate([trial.get("outputs")[::EVERY] for trial in trials])
+        shown.append(replace(start, outputs=outputs))
+        positions += [trial.get("positions")[::EVERY] for trial in trials]
     return Scene(
         title=f"A soft body computes: {Path(config.body).stem}",
         body=stored.body,
         options=options,
         readouts=shown,
         stops=stops,
-        positions=np.concatenate([trial.get("positions")[::EVERY] for trial in trials]),
-        outputs=np.concatenate([trial.get("outputs")[::EVERY] for trial in trials]),
+        positions=np.concatenate(positions),
         check=_check(stored, options, shown[0], stops),
         kick_speed=config.kick_speed,
         deformation=config.deformation,
@@ -145,10 +149,10 @@ def _targets(stored: StoredBody, name: str, stops: Sequence[Array]) -> list[Targ
     return [one for one in found if one.n_outputs == stored.body.n_outputs]
 
 
-def _shown(
+def _start(
     stored: StoredBody, options: Options, name: str, rows: Array, stops: Sequence[Array]
 ) -> ShownReadout:
-    """A readout, its target, and its start: on the target, or at rest without one."""
+    """A readout, its target, and its start: on the target, or at rest without one. No trial yet."""
     body, targets = stored.body, _targets(stored, name, stops)
     simulation = Simulation(body, **vars(options))
     if targets:
@@ -160,6 +164,7 @@ def _shown(
         readout=Readout.of(rows, body.n_springs, body.n_outputs, name),
         positions=state.positions,
         velocities=state.velocities,
+        outputs=np.empty((0, body.n_outputs)),
         orbits=[target.orbit(ORBIT_POINTS) for target in targets],
     )
 

@@ -8,7 +8,7 @@ function addControls(page) {
   page.buttons = { pause: button(bar, "", () => pause(page, !page.paused)) };
   button(bar, "Start again", () => startAgain(page));
   button(bar, "Kick", () => kick(page.loop));
-  page.buttons.freeze = scene.ranges.map((_, c) =>
+  page.buttons.freeze = page.loop.held.map((_, c) =>
     button(bar, `Freeze x${c + 1}`, () => toggleFreeze(page, c)));
   if (scene.readouts.length > 1) {
     select(bar, "Readout", scene.readouts.map(({ name }) => name.replaceAll("_", " ")), 0,
@@ -17,16 +17,18 @@ function addControls(page) {
   select(bar, "Speed", SPEEDS.map((speed) => `× ${speed}`), SPEEDS.indexOf(1),
          (k) => (page.speed = SPEEDS[k]));
   page.stops = scene.stops.map((values) => values.length >> 1);
-  scene.stops.forEach((values, c) => slider(bar, scene.stops.length > 1 ? `Input ${c + 1}` : "Input", values,
-    (k) => { page.stops[c] = k; page.loop.inputs[c] = values[k]; }));
+  scene.stops.forEach((values, c) => {
+    const name = scene.stops.length > 1 ? `Input ${c + 1}` : "Input";
+    slider(bar, name, values, (k) => { page.stops[c] = k; page.loop.inputs[c] = values[k]; });
+  });
   addPointer(page);
   addKeys(page);
 }
 
 function button(bar, text, press) {
-  const made = bar.appendChild(Object.assign(document.createElement("button"), { type: "button", textContent: text }));
+  const made = Object.assign(document.createElement("button"), { type: "button", textContent: text });
   made.addEventListener("click", press);
-  return made;
+  return bar.appendChild(made);
 }
 
 function select(bar, name, texts, first, choose) {
@@ -79,7 +81,8 @@ function addPointer(page) {
     canvas.setPointerCapture(event.pointerId);
     canvas.classList.add("pulling");
     page.chosen = null;
-    page.held = nearestNode(page.loop, viewOf(canvas, page.loop.scene), event.offsetX, event.offsetY);
+    const view = viewOf(canvas, page.loop.scene);
+    page.held = nearestNode(page.loop, view, event.offsetX, event.offsetY);
     pullTo(page, page.held, event.offsetX, event.offsetY);
   });
   canvas.addEventListener("pointermove", (event) => {
@@ -100,12 +103,17 @@ function nearestNode(loop, view, px, py) {
   return away.indexOf(Math.min(...away));
 }
 
+/** From so far away [m] the mouse pulls with all its force. */
+function fullPull({ frame, scale }) {
+  return (PULL_SHARE * Math.max(frame[2], frame[3])) / scale;
+}
+
 /** Pull a free node towards a pixel: displacements on the screen are `scale` times as large. */
 function pullTo(page, index, px, py) {
   const { scene } = page.loop, view = viewOf(page.canvases.body, scene);
   const [x, y] = scene.rest[scene.free[index]];
-  const full = (PULL_SHARE * Math.max(...scene.frame.slice(2))) / scene.scale;
-  page.loop.pull = { index, full, x: (view.fromX(px) - x) / scene.scale, y: (view.fromY(py) - y) / scene.scale };
+  const to = { x: (view.fromX(px) - x) / scene.scale, y: (view.fromY(py) - y) / scene.scale };
+  page.loop.pull = { index, full: fullPull(scene), ...to };
 }
 
 function addKeys(page) {
@@ -121,7 +129,8 @@ function addKeys(page) {
   canvas.addEventListener("keyup", (event) => event.key in ARROWS && letGo(page.loop));
   canvas.addEventListener("blur", () => { page.chosen = null; letGo(page.loop); });
   document.addEventListener("keydown", (event) => {
-    if (event.ctrlKey || event.metaKey || event.altKey || event.target.matches("button, select, input, summary")) return;
+    if (event.ctrlKey || event.metaKey || event.altKey) return;
+    if (event.target.matches("button, select, input, summary")) return; // they have keys of their own
     const output = Number(event.key) - 1;
     if (event.key === " ") pause(page, !page.paused);
     else if (event.key === "k") kick(page.loop);
@@ -134,8 +143,8 @@ function addKeys(page) {
 
 /** With the greatest force, in one direction, from where the node is. */
 function pullByKey(page, [right, up]) {
-  const { loop } = page, { dimensions } = loop.scene;
+  const { loop } = page, full = fullPull(loop.scene);
   page.chosen ??= 0;
-  const at = page.chosen * dimensions, far = PULL_SHARE * Math.max(...loop.scene.frame.slice(2)) / loop.scene.scale;
-  loop.pull = { index: page.chosen, full: far, x: loop.qpos[at] + far * right, y: loop.qpos[at + 1] + far * up };
+  const at = page.chosen * loop.scene.dimensions;
+  loop.pull = { index: page.chosen, full, x: loop.qpos[at] + full * right, y: loop.qpos[at + 1] + full * up };
 }

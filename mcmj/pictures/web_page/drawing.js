@@ -7,8 +7,8 @@ const NODE_SHARE = 0.014, SPRING_SHARE = 0.005, PULL_SHARE = 0.1; // of the view
 const WIDEST = 1.5; // how far ranges grow with what the outputs do, in their own widths
 const MARGIN = { left: 46, right: 8, top: 8, bottom: 34 };
 
-/** The outputs of the last seconds: a ring of rows. */
-function makeTrail(nOutputs, timestep) {
+/** The outputs of the last seconds. */
+function makeTrail(timestep) {
   const every = Math.max(1, Math.round(WINDOW / SAMPLES / timestep));
   return { every, rows: [], room: Math.round(WINDOW / (every * timestep)) };
 }
@@ -24,7 +24,8 @@ function cleared(canvas) {
   const dense = window.devicePixelRatio || 1;
   const width = canvas.clientWidth, height = canvas.clientHeight;
   const wide = Math.round(width * dense), tall = Math.round(height * dense);
-  if (canvas.width !== wide || canvas.height !== tall) Object.assign(canvas, { width: wide, height: tall });
+  if (canvas.width !== wide) canvas.width = wide;
+  if (canvas.height !== tall) canvas.height = tall;
   const pen = canvas.getContext("2d");
   pen.setTransform(dense, 0, 0, dense, 0, 0);
   pen.clearRect(0, 0, width, height);
@@ -176,10 +177,10 @@ function widened([low, high], share) {
 
 /** The range of an output: the usual one, and what it did in the last seconds. */
 function rangeOf(loop, trail, c) {
-  const [low, high] = loop.scene.ranges[c], most = WIDEST * (high - low);
+  const [low, high] = loop.readout.ranges[c], most = WIDEST * (high - low);
   const values = trail.rows.map((row) => row.values[c]);
-  const wide = [Math.max(low - most, Math.min(low, ...values)), Math.min(high + most, Math.max(high, ...values))];
-  return widened(wide, 0.15);
+  const lowest = Math.max(low - most, Math.min(low, ...values));
+  return widened([lowest, Math.min(high + most, Math.max(high, ...values))], 0.15);
 }
 
 function drawPortrait(canvas, loop, trail, orbit) {
@@ -195,7 +196,7 @@ function drawPortrait(canvas, loop, trail, orbit) {
   pen.strokeStyle = pen.fillStyle = colours.outputs[0];
   pen.lineWidth = 1.6;
   for (let k = 0; k < FADES; k++) {
-    const from = Math.floor((k * points.length) / FADES), to = Math.floor(((k + 1) * points.length) / FADES);
+    const [from, to] = [k, k + 1].map((one) => Math.floor((one * points.length) / FADES));
     pen.globalAlpha = ((k + 1) / FADES) ** 2;
     line(pen, points.slice(from, to + 1));
   }
@@ -210,7 +211,7 @@ function drawPortrait(canvas, loop, trail, orbit) {
 function drawStrip(canvas, loop, trail) {
   const frame = cleared(canvas), { pen } = frame, { colours, timestep } = loop.scene;
   const now = Math.max(WINDOW, loop.steps * timestep);
-  const ranges = loop.scene.ranges.map((_, c) => rangeOf(loop, trail, c));
+  const ranges = loop.readout.ranges.map((_, c) => rangeOf(loop, trail, c));
   const all = [Math.min(...ranges.map((r) => r[0])), Math.max(...ranges.map((r) => r[1]))];
   pen.save();
   const { toX, toY } = axes(frame, [now - WINDOW, now], all, "time [s]", "outputs");

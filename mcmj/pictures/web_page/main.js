@@ -14,9 +14,13 @@ function say(text, wrong = false) {
 async function start() {
   const scene = JSON.parse(document.getElementById("scene").textContent);
   const loop = await openLoop(scene);
-  const canvases = Object.fromEntries(["body", "portrait", "strip"].map((id) => [id, document.getElementById(id)]));
-  const page = { loop, canvases, trail: makeTrail(scene.nOutputs, scene.timestep), speed: 1, chosen: null, held: null,
-                 paused: false, owed: 0, last: null, told: { at: 0, frames: 0, steps: 0 } };
+  const ids = ["body", "portrait", "strip"];
+  const canvases = Object.fromEntries(ids.map((id) => [id, document.getElementById(id)]));
+  const page = { loop, canvases, trail: makeTrail(scene.timestep), speed: 1, paused: false,
+                 chosen: null, // free node that the keys pull
+                 held: null, // free node that the pointer pulls
+                 owed: 0, last: null, // s, and ms of the last frame
+                 told: { at: 0, frames: 0, steps: 0, stepping: 0 } };
   window.mcmj = page; // for the console
   if (location.hash === "#check") return check(loop);
   addCaptions(scene);
@@ -29,10 +33,9 @@ async function start() {
 }
 
 function check(loop) {
-  const { steps } = loop.scene.check, begun = performance.now();
   const difference = largestDifference(loop);
-  const rate = Math.round((1000 * steps) / (performance.now() - begun));
-  say(`Outputs differ from mcmj's by ${difference.toPrecision(2)} at most over ${steps} steps, ${rate} a second.`);
+  const { steps } = loop.scene.check;
+  say(`Outputs differ from mcmj's by ${difference.toPrecision(2)} at most over ${steps} steps.`);
   document.title = `check ${difference}`;
 }
 
@@ -40,7 +43,8 @@ function addCaptions({ scale, nOutputs, dimensions, readouts, colours }) {
   const seen = dimensions === 3 ? "Seen along z. " : "";
   const fill = (id, text) => document.getElementById(`${id}-caption`).append(text);
   for (const [kind, colour] of Object.entries(colours.kinds)) {
-    const mark = Object.assign(document.createElement("span"), { textContent: kind === "fixed" ? "■" : "●" });
+    const mark = document.createElement("span");
+    mark.textContent = kind === "fixed" ? "■" : "●";
     mark.style.color = colour;
     fill("body", mark);
     fill("body", ` ${kind} `);
@@ -48,7 +52,8 @@ function addCaptions({ scale, nOutputs, dimensions, readouts, colours }) {
   fill("body", ` ${seen}Springs red when stretched, blue when shortened; displacements × ${scale}.`);
   const target = readouts.some(({ orbits }) => orbits.length) ? "Red: the target. " : "";
   fill("portrait", `${target}Black: the last ${WINDOW} s of the outputs x1 and x2.`);
-  fill("strip", "The outputs over time, x1 black" + [", x2 blue", ", x3 green", ", x4 orange"].slice(0, nOutputs - 1).join("") + ".");
+  const names = ["x1 black", "x2 blue", "x3 green", "x4 orange"].slice(0, nOutputs);
+  fill("strip", `The outputs over time: ${names.join(", ")}.`);
   if (nOutputs < 2) {
     document.querySelector("main").classList.add("one-output");
     document.getElementById("portrait-figure").hidden = true;
@@ -58,7 +63,8 @@ function addCaptions({ scale, nOutputs, dimensions, readouts, colours }) {
 function addLicences() {
   const details = document.querySelector("details");
   details.addEventListener("toggle", async () => {
-    document.getElementById("licences").textContent = new TextDecoder().decode(await unpacked("packed-licences"));
+    const texts = await unpacked("packed-licences");
+    document.getElementById("licences").textContent = new TextDecoder().decode(texts);
   }, { once: true });
 }
 
@@ -80,7 +86,7 @@ function frame(page, now) {
 /** The body's time since the last frame, or as much of it as there is time for. */
 function advance(page, elapsed) {
   const { loop, trail } = page, { timestep } = loop.scene;
-  const until = performance.now() + Math.max(STEPPING, 500 * elapsed);
+  const begun = performance.now(), until = begun + Math.max(STEPPING, 500 * elapsed);
   page.owed += elapsed * page.speed;
   while (page.owed >= timestep && performance.now() < until) {
     step(loop);
@@ -88,13 +94,15 @@ function advance(page, elapsed) {
     page.owed -= timestep;
     page.told.steps += 1;
   }
+  page.told.stepping += performance.now() - begun;
   page.owed = Math.min(page.owed, timestep); // what is missed is missed: slow motion
 }
 
 function draw({ loop, trail, canvases, chosen, stops }) {
   drawBody(canvases.body, loop, chosen);
   const { orbits } = loop.readout;
-  if (loop.scene.nOutputs > 1) drawPortrait(canvases.portrait, loop, trail, orbits[orbits.length > 1 ? stops[0] : 0]);
+  const orbit = orbits[orbits.length > 1 ? stops[0] : 0];
+  if (loop.scene.nOutputs > 1) drawPortrait(canvases.portrait, loop, trail, orbit);
   drawStrip(canvases.strip, loop, trail);
 }
 
@@ -106,8 +114,11 @@ function report(page, now) {
   if (passed < REPORT) return;
   const pace = (told.steps * loop.scene.timestep * 1000) / passed;
   const frames = Math.round((told.frames * 1000) / passed);
-  if (told.at && !page.paused) say(`${pace.toFixed(2)} × real time, ${frames} frames a second`);
-  page.told = { at: now, frames: 0, steps: 0 };
+  const share = ((100 * told.stepping) / passed).toPrecision(2);
+  if (told.at && !page.paused) {
+    say(`${pace.toFixed(2)} × real time, ${frames} frames a second; physics: ${share} % of the time`);
+  }
+  page.told = { at: now, frames: 0, steps: 0, stepping: 0 };
 }
 
 start().catch((error) => {

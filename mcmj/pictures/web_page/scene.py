@@ -36,6 +36,7 @@ class ShownReadout:
         name: of it.
         readout: its weights and bias.
         positions, velocities: (N, D) where it starts.
+        outputs: (T, n_outputs) of trial runs by it.
         orbits: (P, n_outputs) of its target: none, one, or one for every stop of the first input.
     """
 
@@ -43,7 +44,14 @@ class ShownReadout:
     readout: Readout
     positions: Array
     velocities: Array
+    outputs: Array
     orbits: Sequence[Array] = ()
+
+    @property
+    def ranges(self) -> Array:
+        """Lowest and highest of every output (n_outputs, 2), the target's included."""
+        whole = np.concatenate([self.outputs, *self.orbits])
+        return np.stack([whole.min(axis=0), whole.max(axis=0)], axis=1)
 
 
 @dataclass(frozen=True)
@@ -77,7 +85,6 @@ class Scene:
         readouts: the first closes the loop at the start.
         stops: the values (K,) that the slider of each input takes; it starts in the middle.
         positions: (T, N, D) of trial runs, from which magnifications are taken.
-        outputs: (T, n_outputs) of them.
         check: a run to compare with.
         kick_speed: standard deviation of the nodes' speeds after a kick [m/s].
         deformation: displacements are drawn this many times larger; None: a round factor.
@@ -90,7 +97,6 @@ class Scene:
     readouts: Sequence[ShownReadout]
     stops: Sequence[Array]
     positions: Array
-    outputs: Array
     check: Check
     kick_speed: float
     deformation: float | None = None
@@ -109,14 +115,8 @@ class Scene:
     @property
     def largest_pull(self) -> float:
         """Of the mouse [N]."""
-        return PULL * float(np.abs(self.outputs @ self.body.w_fb.T).max())
-
-    @property
-    def ranges(self) -> Array:
-        """Lowest and highest of every output (n_outputs, 2), targets included."""
-        orbits = [orbit for readout in self.readouts for orbit in readout.orbits]
-        whole = np.concatenate([self.outputs, *orbits])
-        return np.stack([whole.min(axis=0), whole.max(axis=0)], axis=1)
+        outputs = np.concatenate([readout.outputs for readout in self.readouts])
+        return PULL * float(np.abs(outputs @ self.body.w_fb.T).max())
 
     @property
     def plain(self) -> dict[str, object]:
@@ -129,11 +129,11 @@ class Scene:
             "delay": options.feedback_delay,
             "stages": integrator_named(options.integrator).stages,
             "dimensions": body.dimensions,
-            "rest": body.positions.tolist(),
-            "free": body.free.tolist(),
-            "springs": body.springs.tolist(),
-            "restLengths": body.rest_lengths.tolist(),
-            "stops": [values.tolist() for values in self.stops],
+            "rest": body.positions,
+            "free": body.free,
+            "springs": body.springs,
+            "restLengths": body.rest_lengths,
+            "stops": self.stops,
             "nOutputs": body.n_outputs,
             "readouts": [self._plain_readout(readout) for readout in self.readouts],
             "frame": frame(body),
@@ -141,7 +141,6 @@ class Scene:
             "largestStrain": self.largest_strain,
             "largestPull": self.largest_pull,
             "kickSpeed": self.kick_speed,
-            "ranges": self.ranges.tolist(),
             "colours": self._colours(),
             "check": vars(self.check),
         }
@@ -151,10 +150,11 @@ class Scene:
         body, free = self.body, self.body.free
         return {
             "name": readout.name,
-            "weights": readout.readout.weights.T.tolist(),
-            "bias": readout.readout.bias.tolist(),
-            "qpos": (readout.positions - body.positions)[free].ravel().tolist(),
-            "qvel": readout.velocities[free].ravel().tolist(),
+            "weights": readout.readout.weights.T,
+            "bias": readout.readout.bias,
+            "qpos": (readout.positions - body.positions)[free].ravel(),
+            "qvel": readout.velocities[free].ravel(),
+            "ranges": readout.ranges,
             "orbits": [_rounded(orbit) for orbit in readout.orbits],
         }
 
