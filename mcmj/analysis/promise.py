@@ -76,7 +76,8 @@ def response(body: Body, s: complex) -> npt.NDArray[np.complex128]:
     gap = body.positions[body.springs[:, 1]] - body.positions[body.springs[:, 0]]
     axis = gap / np.linalg.norm(gap, axis=1)[:, None]
     apart = moved[body.springs[:, 1]] - moved[body.springs[:, 0]]
-    return np.einsum("la,lac->lc", axis, apart)
+    found: npt.NDArray[np.complex128] = np.einsum("la,lac->lc", axis, apart)
+    return found
 
 
 def _matrices(body: Body) -> tuple[Array, Array, Array]:

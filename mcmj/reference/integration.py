@@ -4,6 +4,7 @@
     semi_implicit_euler  compiled twin of MuJoCo's Euler:  v += h F/m;  p += h v
     rk4                  compiled twin of MuJoCo's RK4
     leapfrog             compiled twin of the leapfrog (mcmj.core.callbacks.leapfrog): second order
+    adaptive_leapfrog    the same in steps as short as the dampers ask for (`twin.adaptive`)
     toolbox_euler        the authors' scheme: spring rates by backward difference,
                          x2 = (l_k - l_{k-1}) / h with l_{-1} = l0; p += h v;  v += h F/m
     toolbox_rk           the same with p += h v + h^2 F/2m, what Runge-Kutta gives for a held force

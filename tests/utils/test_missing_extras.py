@@ -23,6 +23,8 @@ EVOLUTION = "from mcmj.search.evolution import Evolution; Evolution(2, 0, spread
 @pytest.mark.parametrize(
     ("package", "extra", "use"),
     [
+        ("sympy", "theory", "import mcmj.analysis.lie_brackets"),
+        ("sympy", "theory", "import mcmj.experiments.emulate.command"),
         ("xarray", "files", "import mcmj.simulation.trajectory_files.zarr"),
         ("zarr", "files", "import mcmj.simulation.trajectory_files.zarr"),
         ("h5py", "files", "import mcmj.simulation.trajectory_files.openprc"),
