@@ -7,7 +7,7 @@ import pytest
 
 import mcmj
 from mcmj.analysis.promise import linear_measures
-from mcmj.experiments.design import one_body
+from mcmj.experiments.design import one_body, trade_off
 from mcmj.experiments.design.config import Config
 from mcmj.experiments.design.judges import InputDriven, Tried
 from mcmj.experiments.design.run import run
@@ -115,6 +115,29 @@ def test_scores_of_bodies_that_blow_up_or_leave_are_in_order():
     assert np.isfinite(scores).all()
     assert Tried((0.01, np.inf)).worst == np.inf
     assert Tried((0.01, np.inf)).score < Tried((0.1, np.inf)).score
+
+
+def test_a_front_is_what_nothing_beats_in_both():
+    rng = np.random.default_rng(0)
+    points = rng.random((60, 2)).round(1)  # with ties
+    beaten = [((points <= p).all(axis=1) & (points < p).any(axis=1)).any() for p in points]
+    best = np.unique(points[~np.array(beaten)], axis=0)
+    assert (trade_off.front(points) == best).all()
+
+
+def test_a_trade_off_tries_as_many_at_random_and_noise_costs():
+    config = trade_off.Config(nodes=4, tries=3, free_run=26.0, teaching=SHORT)
+    result = trade_off.run(config)
+    assert len(result.designed) == len(result.random)
+    assert len(result.designed) >= 1 + 3 * len(trade_off.WEIGHTS)
+    assert (result.designed[0] == result.random[0]).all()
+    assert len(front := trade_off.front(result.designed))
+    assert (front.min(axis=0) == result.designed.min(axis=0)).all()
+    judge, body = LEARNS.judge, mcmj.random_body(21, nodes=10)
+    quiet, small, large = (judge.noisy(body, 0, x).errors for x in (1e-9, 1e-2, 3e-2))
+    assert quiet[0] == pytest.approx(quiet[1], rel=1e-3)
+    assert quiet[0] == small[0] == judge.quick(body, 0).worst
+    assert quiet[1] < small[1] < large[1]
 
 
 def test_bad_configs():

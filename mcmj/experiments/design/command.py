@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+import numpy as np
 from rich.console import Console
 
 from mcmj.experiments.base import Experiment, table_of
@@ -42,6 +43,14 @@ def show(result: Result, console: Console) -> None:
         table = table_of("what tells beforehand", "measure before teaching", "area, held out")
         for name, area in sorted(areas.items(), key=lambda item: -item[1]):
             table.add_row(name.replace("_", " "), f"{area:.2f}")
+        console.print(table)
+    if result.fronts is not None:
+        title = f"noise of {config.sensor_noise:g} m on all lengths"
+        table = table_of(title, "bodies", "median of the least error", "successes")
+        for kind in ("random", "designed"):
+            errors = result.fronts.least(kind)
+            good = f"{(errors < config.threshold).sum()} of {len(errors)}"
+            table.add_row(kind, f"{100 * np.median(errors):.2g} %", good)
         console.print(table)
 
 

@@ -6,14 +6,15 @@ from typing import Annotated
 
 import tyro
 
-from mcmj.experiments.design import measured, one_body
+from mcmj.experiments.design import measured, one_body, trade_off
 from mcmj.search.experiment import Trial
 from mcmj.search.space import MAX_SEED, MAX_TRIALS
 from mcmj.utils.validation import require_count, require_names
 
-PARTS = ("bodies", "smallest", "predictors")
+PARTS = ("bodies", "smallest", "predictors", "pareto")
 DESIGN = "mcmj.experiments.design.one_body"  # the experiments that trials are
 MEASURE = "mcmj.experiments.design.measured"
+TRADE_OFF = "mcmj.experiments.design.trade_off"
 
 
 @dataclass(frozen=True)
@@ -29,7 +30,8 @@ class Config(one_body.Config):
         seeds: number of bodies, of consecutive seeds.
         parts: bodies: one from each random body; smallest: the same with every number of nodes
             of sizes; predictors: which measure of a random body before teaching tells whether
-            it will learn.
+            it will learn; pareto: exact or robust against noise on the lengths, by several weights
+            of both.
         sizes: numbers of nodes of the part smallest.
         measured: number of random bodies of the part predictors.
         varied: what may differ from the random body: springs, rest_lengths, positions, masses,
@@ -42,6 +44,8 @@ class Config(one_body.Config):
         judged: number of noise seeds, not those of search or checks, that it is judged with.
         free_run: from total rest, its last 20 s are judged [s].
         teaching: how the readout is taught; input_driven has its own way.
+        tries: number of bodies for each weight of the part pareto.
+        sensor_noise: standard deviation of its white noise on all lengths [m].
         workers: processes, one thread each; default: one a core.
         store: file that keeps what is finished; default: trials.sqlite in the output folder.
     """
@@ -51,6 +55,8 @@ class Config(one_body.Config):
     parts: tuple[str, ...] = ("bodies",)
     sizes: tuple[int, ...] = (3, 4, 5, 6, 8, 10)
     measured: int = 1000
+    tries: int = 100
+    sensor_noise: float = 0.03
     workers: int | None = None
     store: Path | None = None
 
@@ -62,7 +68,8 @@ class Config(one_body.Config):
         if self.workers is not None:
             require_count("workers", self.workers, 1)
         require_count("measured", self.measured, 10, MAX_TRIALS)
-        self.trials, self.measurements  # noqa: B018  builds, so checks, the configs of all of them
+        # these build, so check, the configs of all of them
+        self.trials, self.measurements, self.trade_offs  # noqa: B018
 
     @property
     def trials(self) -> dict[str, dict[int, list[Trial]]]:
@@ -79,6 +86,22 @@ class Config(one_body.Config):
             return []
         one = measured.Config(self.task, self.settings.nodes, teaching=self.teaching)
         return [Trial(MEASURE, replace(one, seed=self.seed + k)) for k in range(self.measured)]
+
+    @property
+    def trade_offs(self) -> list[Trial]:
+        """Of the part pareto."""
+        if "pareto" not in self.parts:
+            return []
+        one = trade_off.Config(
+            task=self.task,
+            nodes=self.settings.nodes,
+            varied=self.varied,
+            spread=self.spread,
+            tries=self.tries,
+            sensor_noise=self.sensor_noise,
+            teaching=self.teaching,
+        )
+        return [Trial(TRADE_OFF, replace(one, seed=self.seed + k)) for k in range(self.seeds)]
 
     def _of(self, nodes: int) -> list[Trial]:
         names = [field.name for field in fields(one_body.Config)]

@@ -3,7 +3,9 @@
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 
+from mcmj.experiments.design.fronts import Fronts
 from mcmj.experiments.design.predictors import TOGETHER, Predictors
 from mcmj.experiments.design.result import KINDS, Designs, Result
 from mcmj.experiments.search.figure import draw_scores
@@ -11,7 +13,7 @@ from mcmj.metrics.success_rates import wilson_interval
 from mcmj.mjcf.read import from_mjcf
 from mcmj.pictures.plotting import TITLES, count_in_whole_numbers, draw_network, new_figure
 from mcmj.search.experiment import Score
-from mcmj.utils.colours import BLACK, BLUE, GROUP_COLOURS, RED
+from mcmj.utils.colours import BLACK, BLUE, GROUP_COLOURS, RED, TARGET_COLOUR
 
 COLOURS = dict(zip(KINDS, GROUP_COLOURS, strict=True))
 
@@ -25,6 +27,8 @@ def figures(result: Result) -> dict[str, Figure]:
         found["smallest"] = smallest_figure(result)
     if result.predictors is not None:
         found["predictors"] = predictors_figure(result, result.predictors)
+    if result.fronts is not None:
+        found["pareto"] = pareto_figure(result, result.fronts)
     return found
 
 
@@ -90,6 +94,32 @@ def predictors_figure(result: Result, predictors: Predictors) -> Figure:
     count = predictors.successes
     axes.set_title(f"{_title(result)}: {count} of {len(predictors.bodies)} random bodies learn it")
     axes.grid(alpha=0.3, axis="x")
+    return figure
+
+
+def pareto_figure(result: Result, fronts: Fronts) -> Figure:
+    """Orbit errors without and with noise on the lengths: the fronts of all bodies."""
+    figure = new_figure(6.4, 5.0)
+    axes = figure.subplots()
+    for kind, mark in (("random", "s"), ("designed", "o")):
+        for body in fronts.bodies:
+            points = np.array(body[kind])
+            axes.plot(*points.T, mark + "-", ms=4, lw=1, color=COLOURS[kind], alpha=0.7)
+    axes.set(xscale="log", yscale="log", xlabel="orbit error without noise")
+    axes.set_ylabel(f"with noise of {result.config.sensor_noise:g} m on all lengths")
+    for line in (axes.axhline, axes.axvline):
+        line(fronts.threshold, color=TARGET_COLOUR, ls="--", lw=1)
+    handles = [
+        Line2D([], [], color=COLOURS[kind], marker=mark, ms=4, label=label)
+        for kind, mark, label in (
+            ("random", "s", "as many random bodies"),
+            ("designed", "o", "designed, three weights"),
+        )
+    ]
+    handles.append(Line2D([], [], color=TARGET_COLOUR, ls="--", label="success is below"))
+    axes.legend(handles=handles, frameon=False)
+    axes.set_title(f"{_title(result)}: a front for each of {len(fronts.bodies)} bodies")
+    axes.grid(alpha=0.3)
     return figure
 
 

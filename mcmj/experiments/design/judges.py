@@ -18,6 +18,7 @@ from mcmj.reference.integration import integrate_smooth
 from mcmj.simulation.simulation import Simulation
 from mcmj.targets.limit_cycles import Target
 from mcmj.targets.named import named_target
+from mcmj.utils.seeds import stream
 from mcmj.utils.validation import Array
 
 INPUT_DRIVEN = "input_driven"
@@ -90,13 +91,16 @@ class LimitCycle:
 
     def quick(self, body: Body, seed: int) -> Tried:
         """At most QUICK of the course and QUICK_RUN of the run."""
-        short = replace(
+        return self._try(body, seed, self._short, min(self.free_run, QUICK_RUN), "twin")
+
+    @property
+    def _short(self) -> Teaching:
+        return replace(
             self.teaching,
             duration=min(self.teaching.duration, QUICK.duration),
             washout=min(self.teaching.washout, QUICK.washout),
             every=max(self.teaching.every, QUICK.every),
         )
-        return self._try(body, seed, short, min(self.free_run, QUICK_RUN), "twin")
 
     def full(self, body: Body, seed: int, engine: str = "twin") -> Tried:
         """The whole course, then the free run from total rest."""
@@ -110,19 +114,44 @@ class LimitCycle:
         )
         return np.inf if found is None else self._error(found.get("outputs"))
 
+    def noisy(self, body: Body, seed: int, deviation: float) -> Tried:
+        """After a short course, two errors: from total rest, and that with noise on all lengths.
+
+        Args:
+            deviation: of the white noise [m].
+        """
+        simulation = Simulation(body, engine="twin")
+        steps = round(self.free_run / simulation.timestep)
+
+        def errors() -> tuple[float, float]:
+            teach(simulation, self.target, self._short, seed)
+            readout = simulation.w_out
+            assert readout is not None
+            noise = stream(seed, "schedule_noise").standard_normal((steps, len(readout)))
+            fed_back = deviation * noise @ readout
+            quiet = self._from_rest(simulation, steps, None)
+            return quiet, or_lost(lambda: self._from_rest(simulation, steps, fed_back), np.inf)
+
+        return Tried(or_lost(errors, (np.inf, np.inf)), simulation.w_out)
+
     def _try(self, body: Body, seed: int, teaching: Teaching, run: float, engine: str) -> Tried:
         simulation = Simulation(body, engine=engine)
 
-        def outputs() -> Array:
+        def error() -> float:
             teach(simulation, self.target, teaching, seed)
-            simulation.reset()
-            total, last = (round(s / simulation.timestep) for s in (run, min(run, WINDOW)))
-            simulation.rollout(total - last, record=())
-            return simulation.rollout(last, record=("outputs",)).get("outputs")
+            return self._from_rest(simulation, round(run / simulation.timestep), None)
 
-        found = or_lost(outputs, None)
-        error = np.inf if found is None else self._error(found)
-        return Tried((error,), simulation.w_out)
+        return Tried((or_lost(error, np.inf),), simulation.w_out)
+
+    def _from_rest(self, simulation: Simulation, steps: int, offset: Array | None) -> float:
+        """Orbit error at the end of a free run, to whose feedback an offset is added."""
+        simulation.reset()
+        first = steps - min(steps, round(WINDOW / simulation.timestep))
+        before, last = (None, None) if offset is None else (offset[:first], offset[first:])
+        if first:
+            simulation.rollout(first, offset=before, record=())
+        run = simulation.rollout(steps - first, offset=last, record=("outputs",))
+        return self._error(run.get("outputs"))
 
     def _error(self, outputs: Array) -> float:
         last = outputs[-round(WINDOW / 1e-3) :: SPARSE]

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from mcmj.experiments.design.config import Config
+from mcmj.experiments.design.fronts import Fronts
 from mcmj.experiments.design.predictors import Predictors
 from mcmj.metrics.success_rates import success_rate
 from mcmj.utils.validation import Array
@@ -71,11 +72,12 @@ class Designs:
 
 @dataclass(frozen=True)
 class Result:
-    """Designs by part and number of nodes, and what tells success beforehand."""
+    """Designs by part and number of nodes, what tells success beforehand, exact or robust."""
 
     config: Config
     designs: dict[str, dict[int, Designs]]
-    predictors: Predictors | None
+    predictors: Predictors | None = None
+    fronts: Fronts | None = None
 
     @property
     def bodies(self) -> Designs | None:
@@ -115,6 +117,9 @@ class Result:
             table["smallest"] = {task: {**fewest, "by_nodes": by_nodes}}
         if self.predictors is not None:
             table["predictors"] = {task: self.predictors.metrics}
+        if self.fronts is not None:
+            noise = {"sensor_noise": self.config.sensor_noise}
+            table["pareto"] = {task: {**noise, **self.fronts.metrics}}
         return table
 
 

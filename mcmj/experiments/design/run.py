@@ -7,7 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
-from mcmj.experiments.design.config import Config
+from mcmj.experiments.design.config import DESIGN, TRADE_OFF, Config
+from mcmj.experiments.design.fronts import Fronts
 from mcmj.experiments.design.predictors import Predictors
 from mcmj.experiments.design.result import Designs, Result
 from mcmj.search.database import TrialStore
@@ -20,7 +21,11 @@ OnBody = Callable[[float], object]  # gets its orbit error
 
 def total_bodies(config: Config) -> int:
     """Different ones, for a progress bar."""
-    return len({trial.key for trial in [*_designs(config), *config.measurements]})
+    return len({trial.key for trial in _all(config)})
+
+
+def _all(config: Config) -> list[Trial]:
+    return [*_designs(config), *config.measurements, *config.trade_offs]
 
 
 def _designs(config: Config) -> list[Trial]:
@@ -46,9 +51,7 @@ def run(
         open_workers(config.workers, None) as workers,
         TrialStore(config.store or store) as kept,
     ):
-        tell = partial(_tell, on_body)
-        done = run_trials(_designs(config), kept, workers, on_outcome=tell).outcomes
-        seen = run_trials(config.measurements, kept, workers, on_outcome=tell).outcomes
+        done = run_trials(_all(config), kept, workers, on_outcome=partial(_tell, on_body)).outcomes
     designs = {
         part: {
             nodes: Designs([done[trial.key].metrics for trial in trials], config.threshold)
@@ -56,13 +59,19 @@ def run(
         }
         for part, sizes in config.trials.items()
     }
-    bodies = [seen[trial.key].metrics for trial in config.measurements]
-    predictors = Predictors([one for one in bodies if one], config.threshold) if bodies else None
-    return Result(config, designs, predictors)
+    measured = [done[trial.key].metrics for trial in config.measurements]
+    known = [one for one in measured if one]  # a body that blew up has none
+    predictors = Predictors(known, config.threshold) if known else None
+    fronts = Fronts([done[trial.key].metrics for trial in config.trade_offs], config.threshold)
+    return Result(config, designs, predictors, fronts if fronts.bodies else None)
 
 
 def _tell(on_body: OnBody, trial: Trial, outcome: Outcome) -> None:
     metrics = outcome.metrics
-    errors = metrics["designed"]["orbit_errors"] if "designed" in metrics else []
-    errors = errors or [metrics.get("orbit_error")]
+    if trial.experiment == DESIGN:
+        errors = metrics["designed"]["orbit_errors"]
+    elif trial.experiment == TRADE_OFF:
+        errors = metrics["designed"][0][:1]  # the most exact of the front
+    else:
+        errors = [metrics.get("orbit_error")]
     on_body(max(np.inf if error is None else error for error in errors))
