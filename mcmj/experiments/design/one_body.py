@@ -54,7 +54,7 @@ class Config:
     varied: tuple[str, ...] = ("springs", "feedback")
     evaluations: int = 400
     spread: float = 0.5
-    aim: float = 0.03
+    aim: float = 0.02
     checks: int = 8
     threshold: float = 0.05
     judged: int = 3
