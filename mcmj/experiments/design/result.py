@@ -46,10 +46,11 @@ class Designs:
 
     @property
     def best(self) -> Mapping[str, Any] | None:
-        """The designed body with the smallest error, if any is a success."""
-        order = np.argsort(self.errors("designed"), kind="stable")
-        best = self.bodies[int(order[0])]
-        return best if best["designed"]["success"] else None
+        """The designed body with the smallest error; one that was good as drawn, if all were."""
+        errors = self.errors("designed")
+        good = [k for k, body in enumerate(self.bodies) if body["designed"]["success"]]
+        order = sorted(good, key=lambda k: (self.evaluations[k] == 1, errors[k]))
+        return self.bodies[order[0]] if order else None
 
     @property
     def metrics(self) -> dict[str, object]:
