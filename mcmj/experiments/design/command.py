@@ -28,7 +28,14 @@ def write(result: Result, folder: Path) -> None:
 def show(result: Result, console: Console) -> None:
     """The result as tables."""
     config = result.config
-    columns = ("nodes", "random", "random search", "designed", "bodies tried", "seconds a body")
+    columns = (
+        "nodes",
+        "random",
+        "random search",
+        "designed",
+        "bodies tried at random",
+        "for designs",
+    )
     title = f"{config.task}: bodies below {100 * config.threshold:g} % under unseen noise"
     table = table_of(title, *columns, words=0)
     rows = {**result.sizes}
@@ -55,11 +62,9 @@ def show(result: Result, console: Console) -> None:
 
 
 def _cells(found: Designs) -> list[str]:
-    total = len(found.bodies)
-    tried = sorted(found.evaluations)
-    seconds = sum(body["seconds"] for body in found.bodies) / total
-    counts = [f"{found.successes(kind)} of {total}" for kind in KINDS]
-    return [*counts, f"{tried[0]} to {tried[-1]}", f"{seconds:.1f}"]
+    counts = [f"{found.successes(kind)} of {len(found.bodies)}" for kind in KINDS]
+    tried = [found.search_evaluations, found.evaluations]
+    return [*counts, *(f"{np.median(x):.0f} ({min(x)} to {max(x)})" for x in tried)]
 
 
 EXPERIMENT = Experiment(

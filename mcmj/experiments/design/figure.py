@@ -48,14 +48,20 @@ def design_figure(result: Result, designs: Designs) -> Figure:
 
 
 def _draw_tried(axes: Axes, designs: Designs) -> None:
-    """Share of the bodies that passed the checks, against bodies tried for each."""
-    tried = np.array(designs.evaluations)
-    passed = np.sort(tried[[body["passed"] for body in designs.bodies]])
-    share = np.arange(1, len(passed) + 1) / len(tried)
-    axes.step([*passed, tried.max()], [*share, len(passed) / len(tried)], where="post", color=BLACK)
-    axes.set(xlabel="bodies tried", ylabel="share of the designs that passed", ylim=(0, 1.02))
+    """Share of the designs, and of the searches at random, that ended, against bodies tried."""
+    most = max(*designs.evaluations, *designs.search_evaluations)
+    for kind, numbers, passed in (
+        ("search", designs.search_evaluations, "search_passed"),
+        ("designed", designs.evaluations, "passed"),
+    ):
+        ended = np.sort(np.array(numbers)[[body[passed] for body in designs.bodies]])
+        share = np.arange(1, len(ended) + 1) / len(numbers)
+        ends = [*ended, most], [*share, len(ended) / len(numbers)]
+        axes.step(*ends, where="post", color=COLOURS[kind], label=KINDS[kind])
+    axes.set(xscale="log", xlabel="bodies tried", ylabel="share that passed", ylim=(0, 1.02))
+    axes.xaxis.set_major_formatter("{x:g}")
     axes.set_title("until one passes its checks")
-    count_in_whole_numbers(axes)
+    axes.legend(frameon=False)
     axes.grid(alpha=0.3)
 
 

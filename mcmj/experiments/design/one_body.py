@@ -156,15 +156,13 @@ def evolve(config: Config) -> Hunt:
     return hunt
 
 
-def search(config: Config, number: int) -> Hunt:
-    """As many bodies at random instead, the drawn one the first."""
-    hunt, settings = Hunt(config), config.settings
+def search(config: Config) -> Hunt:
+    """Bodies at random instead, the drawn one the first: as many as a design may try."""
+    hunt = Hunt(config)
     hunt.attempt(config.drawn)
-    seeds = stream(config.seed, "random_search").integers(2**31, size=number).tolist()
-    for seed in seeds[1:]:
-        if hunt.over:
-            break
-        hunt.attempt(draw_body(seed, settings))
+    numbers = stream(config.seed, "random_search")
+    while not hunt.over:
+        hunt.attempt(draw_body(int(numbers.integers(2**31)), config.settings))
     return hunt
 
 
@@ -208,7 +206,7 @@ class Result:
 
     Attributes:
         body: the designed one.
-        hunt, found: the design; the search at random, with as many bodies.
+        hunt, found: the design; the search at random, with as many bodies at most.
         verdicts: of the bodies "random", "designed" and "search".
         mujoco: the designed one in MuJoCo, with the first of the noises.
         exact: orbit error of its readout under DOP853, of a success; None: not known.
@@ -237,6 +235,7 @@ class Result:
         return {
             **{name: verdict.metrics for name, verdict in self.verdicts.items()},
             "passed": self.hunt.passed,
+            "search_passed": self.found.passed,
             "evaluations": self.hunt.tried,
             "search_evaluations": self.found.tried,
             "parameters": BodySpace(self.config.drawn, self.config.varied).size,
@@ -272,7 +271,7 @@ def run(config: Config) -> Result:
     begin = time.perf_counter()
     hunt = evolve(config)
     seconds = time.perf_counter() - begin
-    found = search(config, hunt.tried)
+    found = search(config)
     bodies = {"random": config.drawn, "designed": hunt.best, "search": found.best}
     known: dict[int, Verdict] = {}  # by body: all three may be the drawn one
     for body in bodies.values():

@@ -14,7 +14,7 @@ from mcmj.utils.validation import Array
 
 KINDS = {
     "random": "drawn at random",
-    "search": "random search, as many bodies tried",
+    "search": "random search",
     "designed": "designed",
 }
 
@@ -41,8 +41,13 @@ class Designs:
 
     @property
     def evaluations(self) -> list[int]:
-        """Bodies tried for each."""
+        """Bodies tried for each design."""
         return [body["evaluations"] for body in self.bodies]
+
+    @property
+    def search_evaluations(self) -> list[int]:
+        """Bodies tried for each search at random, of as many as a design may try."""
+        return [body["search_evaluations"] for body in self.bodies]
 
     @property
     def best(self) -> Mapping[str, Any] | None:
@@ -64,6 +69,7 @@ class Designs:
             )["interval_95"],
             "seconds_per_body": float(np.mean([body["seconds"] for body in self.bodies])),
             "evaluations": self.evaluations,
+            "search_evaluations": self.search_evaluations,
             "mujoco_agreement": float(np.mean([body["mujoco_agrees"] for body in self.bodies])),
             "dop853_confirmed": sum(error < self.threshold for error in exact),
             "dop853_of": len(exact),
