@@ -18,12 +18,17 @@ from mcmj.experiments.registry import GROUPS, entries, experiment_named
 project = "mcmj"
 author = copyright = "The mcmj developers"
 release = mcmj.__version__
-extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon"]
-exclude_patterns = ["data"]
+extensions = ["myst_nb", "sphinx.ext.autodoc", "sphinx.ext.napoleon"]
+exclude_patterns = ["data", "**.ipynb_checkpoints"]
 html_theme = "furo"
 html_title = "mcmj"
 html_static_path: list[str] = []
 myst_heading_anchors = 3
+nb_execution_mode = "cache"
+nb_execution_raise_on_error = True
+nb_execution_timeout = 300
+nb_execution_in_temp = True
+nb_merge_streams = True
 autodoc_member_order = "bysource"
 autodoc_typehints = "signature"
 autodoc_preserve_defaults = True

@@ -26,6 +26,7 @@ import shutil
 import subprocess
 import sys
 from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from statistics import median
@@ -150,15 +151,20 @@ def _table(asked: str) -> Iterator[str]:
     header, *templates = [line.strip() for line in lines]
     found = {name: _metrics_of(name) for name in names.split()}
     metrics = found if len(found) > 1 else found[names]
-    yield header
-    yield "|" + " --- |" * (header.count("|") - 1)
+    rows = []
     for values in _rows(metrics, path):
-        for template in templates:
-            yield Numbers().vformat(template, (), values)
+        with suppress(KeyError):  # an entry of another kind
+            rows += [Numbers().vformat(template, (), values) for template in templates]
+    if not rows:
+        raise SystemExit(f"docs: no row of {names} has the fields of {templates}")
+    yield from (header, "|" + " --- |" * (header.count("|") - 1), *rows)
 
 
 def _metrics_of(name: str) -> dict[str, Any]:
-    text = (DOCS / "data" / f"{name}.json").read_text(encoding="utf-8")
+    path = DOCS / "data" / f"{name}.json"
+    if not path.is_file():
+        raise SystemExit(f"docs: {path} is missing: run the page that has {name}, with --run")
+    text = path.read_text(encoding="utf-8")
     metrics: dict[str, Any] = json.loads(text, object_pairs_hook=_Metrics)["metrics"]
     return metrics
 

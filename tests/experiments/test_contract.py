@@ -59,7 +59,7 @@ RECORDED = Path(__file__).parents[1] / "data" / "recorded"  # support/record.py
 TINY["fit"] = " ".join(
     f"--{name} {RECORDED}/{name}.csv" for name in ("signals", "targets", "inputs")
 )
-APART = {"reproduce", "view"}  # commands of commands, and a person; tested on their own
+APART = {"reproduce", "view", "web"}  # commands, a person, npm; tested on their own
 TIMED = {  # metrics that are times, by path; all others are the same in every run
     "benchmark": ("*",),
     "guided": ("*per_second",),
