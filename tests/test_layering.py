@@ -44,6 +44,7 @@ BELOW = {
 ABOVE = {
     "analysis.stability",
     "learning.environments",
+    "pictures.web_page",
     "pictures.window",
     "simulation.trajectory_files",
 }
@@ -91,6 +92,7 @@ MUJOCO = {
 }
 EXTRAS = {
     "xarray": {"simulation.trajectory_files.zarr"},
+    "sklearn": {"learning.estimator"},
     "h5py": {"simulation.trajectory_files.openprc"},
     "gymnasium": {"learning.environments.gymnasium_env"},
     "dm_control": {"experiments.adopt.suite_models", "learning.environments.environment"},

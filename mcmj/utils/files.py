@@ -1,11 +1,16 @@
-"""Result files: whole or not at all, each with its config, seed and versions. No pickle."""
+"""Result files: whole or not at all, each with its config, seed and versions. No pickle.
 
+And CSV files of the user's, as rows with their line numbers.
+"""
+
+import csv
 import dataclasses
 import functools
 import json
 import os
 import platform
 import shutil
+import sys
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, nullcontext, suppress
 from contextvars import ContextVar
@@ -24,6 +29,24 @@ except ImportError:  # not a Unix
 
 _LOCKED: ContextVar[frozenset[Path]] = ContextVar("_LOCKED", default=frozenset())
 _PACKAGES = ("mcmj", "mujoco", "numpy", "scipy", "numba")
+
+
+def cache_folder() -> Path:
+    """MCMJ_CACHE_DIR, or else mcmj in the system's place for caches; it need not exist yet.
+
+    Raises:
+        RuntimeError: the user has no home.
+    """
+    given = os.environ.get("MCMJ_CACHE_DIR")
+    if given:
+        return Path(given)
+    if sys.platform == "win32":
+        place = os.environ.get("LOCALAPPDATA") or str(Path.home() / "AppData" / "Local")
+    elif sys.platform == "darwin":
+        place = str(Path.home() / "Library" / "Caches")
+    else:
+        place = os.environ.get("XDG_CACHE_HOME") or str(Path.home() / ".cache")
+    return Path(place) / "mcmj"
 
 
 def versions() -> dict[str, str]:
@@ -209,3 +232,21 @@ def plain(value: object) -> object:
     if value is None or isinstance(value, bool | int | str):
         return value
     return str(value)
+
+
+def csv_rows(path: str | Path, name: str, expected: str) -> list[tuple[int, list[str]]]:
+    """Line number and cells of every row that is not empty.
+
+    Args:
+        name, expected: the argument that the file was given as, and what it may be.
+
+    Raises:
+        InvalidArgumentError: the file cannot be read, or is not text.
+    """
+    try:
+        with Path(path).open(encoding="utf-8-sig", newline="") as file:
+            reader = csv.reader(file)
+            return [(reader.line_num, cells) for cells in reader if "".join(cells).strip()]
+    except (OSError, ValueError, csv.Error) as error:
+        reason = getattr(error, "strerror", None) or error
+        raise InvalidArgumentError(name, expected, f"{path}: {reason}") from error

@@ -5,10 +5,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from mcmj.experiments.body_source import readouts_of
 from mcmj.learning.lessons import Teaching
-from mcmj.learning.teaching import synchronise, teach
+from mcmj.learning.teaching import synchronise
 from mcmj.metrics import orbits
-from mcmj.mjcf.bundled import StoredBody, open_body
+from mcmj.mjcf.bundled import open_body
 from mcmj.pictures.film import deformation_scale
 from mcmj.pictures.window.body_viewer import BodyViewer
 from mcmj.pictures.window.viewer import FPS, Viewer
@@ -152,22 +153,8 @@ def _window(config: Config) -> tuple[Viewer, LiveLoop]:
 def _simulation_and_readouts(config: Config) -> tuple[Simulation, dict[str, Array]]:
     """As the file says."""
     stored = open_body(config.body)
-    return Simulation(stored.body, **stored.take()), _readouts(config, stored)
-
-
-def _readouts(config: Config, stored: StoredBody) -> dict[str, Array]:
-    """The file's readouts by name; taught ones if it has none."""
-    if stored.readouts:
-        return stored.readouts
-    if stored.w_out is not None:
-        return {"readout": stored.w_out}
-    stepping = stored.take(engine="twin")
-    return {
-        name: teach(
-            Simulation(stored.body, **stepping), target(name), Teaching(), config.seed
-        ).w_out
-        for name in TARGETS
-    }
+    readouts = readouts_of(stored, config.seed, engine="twin")
+    return Simulation(stored.body, **stored.take()), readouts
 
 
 def _start(simulation: Simulation, name: str, w_out: Array) -> float:
