@@ -25,6 +25,8 @@ TINY = {
     "--stream-symbols 12 --no-maps",
     "certify": "--task quadratic --body quadratic --free-run 15 --window 13 --recovery 22 "
     "--scales 1 --phases 1 --kicks 0.5 --pushes 1 --copies 4 --refine 2",
+    "design": "--nodes 6 --seeds 2 --evaluations 3 --checks 1 --judged 1 --free-run 26 --duration "
+    "12 --washout 4 --parts bodies smallest --sizes 4 --workers 1",
     "drive": "--nodes 8 --rounds 1 --population 2 --elites 2 --time-limit 8 --drive 4",
     "emulate": "--targets van_der_pol --integrators Euler --steps-ms 1 2 --horizon 1",
     "filters": "--tasks volterra --nodes 10 --train 3 --washout 1 --test 2 --engine twin",
@@ -62,6 +64,7 @@ TINY["fit"] = " ".join(
 APART = {"reproduce", "view", "web"}  # commands, a person, npm; tested on their own
 TIMED = {  # metrics that are times, by path; all others are the same in every run
     "benchmark": ("*",),
+    "design": ("*/seconds_per_body",),
     "guided": ("*per_second",),
     "render": ("*_ms",),
     "search": ("trials_per_second", "overhead_fraction"),
