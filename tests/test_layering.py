@@ -74,6 +74,7 @@ MUJOCO = {
     "pictures.window.viewer",
     "pictures.walk_video",
     "robots.ground",
+    "robots.energy",
     "robots.trunk_walker",
     "robots.walk_scene",
     "simulation.batch_engine",

@@ -1,0 +1,225 @@
+"""What else is tried with the first robot, each part with one gait."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+
+from mcmj.experiments.blow_ups import or_lost
+from mcmj.experiments.soft_robot.config import Config
+from mcmj.experiments.soft_robot.result import measures
+from mcmj.experiments.trunk import parts as trunk_parts
+from mcmj.experiments.trunk.parts import end_of
+from mcmj.experiments.trunk.result import LearnedGait, Table, fell
+from mcmj.experiments.trunk.run import learn_on
+from mcmj.learning.lessons import Lesson, Teaching
+from mcmj.learning.practice import Exercise, Practice, practise_exercises
+from mcmj.learning.teaching import Course
+from mcmj.learning.trial import trial_error
+from mcmj.metrics import orbits
+from mcmj.robots.energy import energy_balance
+from mcmj.robots.trunk_walker import has_fallen, new_robot, stand, walk
+from mcmj.simulation.reservoir import Reservoir
+from mcmj.utils.errors import DivergenceError
+from mcmj.utils.progress import OnSteps
+from mcmj.utils.seeds import stream
+from mcmj.utils.validation import Array
+
+Gaits = dict[str, LearnedGait]
+
+
+def by_practice(config: Config, gaits: Gaits, name: str, on_steps: OnSteps) -> Table:
+    """Orbit error of a free run after practice (DAgger), infinite if the robot falls."""
+    gait, learning = gaits[name], config.learning
+    robot = new_robot(gait.trunk)
+    stand(robot)
+    start, washout = robot.snapshot(), learning.washout
+    radius = orbits.rms_radius(gait.target.orbit(orbits.ORBIT_POINTS))
+    teaching = Teaching(
+        noise=learning.noise * radius / np.sqrt(gait.target.n_outputs),
+        ridge_per_row=1e-9, bias=True, every=max(1, round(learning.period / robot.timestep)),
+    )  # fmt: skip
+    lesson = Lesson(gait.target.sample, config.teaching, washout, start=start)
+    course = Course(robot, teaching, config.seed)
+    practice = Practice(
+        rounds=2 * learning.rounds, round_runs=1, round_weight=1.0, trial=learning.trial,
+        trial_window=learning.trial / 2, good_enough=learning.good_enough,
+    )  # fmt: skip
+    exercise = Exercise(
+        replace(lesson, duration=learning.round_duration, washout=0.0),
+        lambda outputs: orbits.orbit_error(outputs, gait.target),
+    )
+    try:
+        course.attend(lesson, on_steps=on_steps)
+    except DivergenceError:
+        return {"orbit_error": np.inf, "trial_errors": []}
+    errors = practise_exercises(course, [exercise], practice, on_steps=on_steps).errors
+    robot.restore(start)
+    fallen = has_fallen(gait.trunk)
+    error = trial_error(robot, gait.target, config.walking, fallen, on_steps=on_steps)
+    return {"orbit_error": error, "trial_errors": list(errors)}
+
+
+def energy(config: Config, gaits: Gaits, name: str, on_steps: OnSteps) -> Table:
+    """The balance of some whole strides, a second."""
+    gait, robot = gaits[name], gaits[name].robot()
+    period = gait.target.period
+    steps = round(max(1, round(2.0 / period)) * period / robot.timestep)
+    balance = energy_balance(robot, gait.trunk, steps)
+    on_steps(steps)
+    seconds = steps * robot.timestep
+    return {
+        "work_J": balance.work / seconds,
+        "positive_work_J": balance.positive / seconds,
+        "muscles_J": balance.muscles / seconds,
+        "trunk_J": balance.trunk / seconds,
+        "ground_J": balance.ground / seconds,
+        "change_J": balance.change / seconds,
+        "balance_error": balance.error,
+    }
+
+
+def controls(config: Config, gaits: Gaits, name: str, on_steps: OnSteps) -> Table:
+    """Is it the lengths, now, that walk? The same readout on others'; and a tape of the outputs."""
+    gait = gaits[name]
+    rng = stream(config.seed, "walk_moments")
+    assert gait.learned is not None
+    weights = gait.learned.w_out
+    robot = gait.robot()
+    shuffled = np.vstack([rng.permutation(weights[:-1]), weights[-1:]])
+    shuffled[-1] += robot.signals @ (weights[:-1] - shuffled[:-1])  # the same outputs at first
+    frozen = np.vstack([0 * weights[:-1], robot.signals[None] @ weights[:-1] + weights[-1:]])
+    table: Table = {"rank": _rank(gait)}
+    for what, readout in (("shuffled", shuffled), ("frozen", frozen)):
+        robot = gait.robot()
+        robot.set_readout(readout)
+        table[what] = end_of(config, gait, robot, config.survive)
+        on_steps(round(config.survive / robot.timestep))
+    return table | {"tape": _tape(config, gait, on_steps)}
+
+
+def _rank(gait: LearnedGait) -> Table:
+    """Of the lengths while it walks: principal components of 99.9 % of their variance."""
+    run = gait.robot().rollout(round(8 * gait.target.period / gait.robot().timestep))
+    lengths = run.get("lengths")
+    spread = np.linalg.svd(lengths - lengths.mean(axis=0), compute_uv=False) ** 2
+    return {
+        "components": int(np.searchsorted(np.cumsum(spread), 0.999 * spread.sum()) + 1),
+        "participation": float(spread.sum() ** 2 / (spread**2).sum()),
+        "springs": lengths.shape[1],
+    }
+
+
+def _tape(config: Config, gait: LearnedGait, on_steps: OnSteps) -> Table:
+    """Pushes from the side of two likes: the loop closed, and open under what it said before.
+
+    How many survive, and how far the push has moved the rhythm of the feet for good, in periods:
+    a tape's cannot move.
+    """
+    robot = gait.robot()
+    steps = round((config.survive + 1.0) / robot.timestep)
+    start = robot.snapshot()
+    tape = robot.rollout(steps, record=("outputs", "qpos"))
+    forces = np.zeros((steps, robot.n_forces))
+    impulse = config.impulses[-1]
+    nodes = gait.trunk.settings.nodes
+    pushed = slice(0, round(0.1 / robot.timestep))
+    table: Table = {"impulse_N_s": impulse}
+    for what in ("closed", "tape"):
+        survived, moved = 0, []
+        for moment in range(config.pushes):
+            for way in (1.0, -1.0):
+                first = round(moment * gait.target.period / config.pushes / robot.timestep)
+                forces[:] = 0.0
+                share = way * impulse / 0.1 / nodes
+                forces[first:][pushed, 1 : 3 * nodes : 3] = share
+                robot.restore(start)
+                drive = {} if what == "closed" else {
+                    "offset": tape.get("outputs"), "gate": 0.0
+                }  # fmt: skip
+                run = or_lost(
+                    lambda drive=drive: robot.rollout(
+                        steps, forces=forces, record=("outputs", "qpos"), **drive
+                    ),
+                    None,
+                )
+                if run is None or has_fallen(gait.trunk)(run):
+                    continue
+                survived += 1
+                moved.append(_apart(run.get("qpos"), tape.get("qpos"), gait, robot.timestep))
+                on_steps(steps)
+        table[what] = {
+            "survived": survived,
+            "of": 2 * config.pushes,
+            "moved_periods": float(np.median(np.abs(moved))) if moved else None,
+        }
+    return table
+
+
+def _apart(one: Array, other: Array, gait: LearnedGait, step: float) -> float:
+    """Phase [periods] between two runs' feet heights, over their last strides."""
+    n = round(gait.target.period / step)
+    last = slice(-n * max(1, len(one) // (4 * n)), None)
+    heights = [run[last, 3 * gait.trunk.settings.nodes + 2 :: 3] for run in (one, other)]
+    turn = np.exp(-2j * np.pi * np.arange(len(heights[0])) / n)
+    first, second = ((turn[:, None] * (h - h.mean(axis=0))).sum(axis=0) for h in heights)
+    return float(np.angle((first * second.conj()).sum()) / (2 * np.pi))
+
+
+def ground(config: Config, gaits: Gaits, name: str, on_steps: OnSteps) -> Table:
+    """Slopes that nobody taught."""
+    gait, table = gaits[name], {}
+    for slope in config.slopes:
+        assert gait.learned is not None
+        robot = new_robot(gait.trunk, slope=float(np.arctan(slope)))
+        robot.set_readout(gait.learned.w_out)
+        state = gait.robot()
+        robot.set_state(state.qpos, state.qvel)
+        table[f"{slope:g}"] = _short(config, gait, robot)
+        on_steps(round(config.judged / robot.timestep))
+    return table
+
+
+def cut(config: Config, gaits: Gaits, name: str, on_steps: OnSteps) -> Table:
+    """A share of the springs is cut: as it was taught, and after learning again."""
+    gait = gaits[name]
+    count = round(config.cut * gait.trunk.n_sensed)
+    chosen = stream(config.seed, "pruning_order").permutation(gait.trunk.n_sensed)[:count]
+    names = [f"s{spring}" for spring in sorted(chosen.tolist())]
+    assert gait.learned is not None
+    robot = new_robot(gait.trunk)
+    robot.alter(cut=names)
+    robot.set_readout(gait.learned.w_out)
+    stand(robot)
+    before = _short(config, gait, robot)
+    robot = new_robot(gait.trunk)
+    robot.alter(cut=names)
+    again = learn_on(config, robot, gait.trunk, gait.target, config.seed, on_steps)
+    found = or_lost(lambda: walk(robot, gait.trunk, config.judged), None)
+    if again is None or found is None or fell(gait, found):
+        return {"cut": count, "before": before, "after": {"falls": 1}}
+    last = found.after(config.judged / 2)
+    return {"cut": count, "before": before, "after": {"falls": 0} | measures(gait, last)}
+
+
+def _short(config: Config, gait: LearnedGait, robot: Reservoir) -> Table:
+    """A walk as long as what is judged, its second half measured."""
+    found = or_lost(lambda: walk(robot, gait.trunk, config.judged), None)
+    if found is None or fell(gait, found):
+        return {"falls": 1}
+    return {"falls": 0} | measures(gait, found.after(config.judged / 2))
+
+
+RUNS: dict[str, Callable[[Config, Gaits, str, OnSteps], object]] = {
+    "regression": trunk_parts.by_regression,
+    "practice": by_practice,
+    "rest": trunk_parts.from_rest,
+    "push": partial(trunk_parts.push, axis=1),
+    "switch": trunk_parts.switch,
+    "steps": trunk_parts.step_study,
+    "energy": energy,
+    "controls": controls,
+    "ground": ground,
+    "cut": cut,
+}
