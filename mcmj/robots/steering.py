@@ -5,6 +5,8 @@ the springs (trunk.TrunkSettings.steer). Strides, over the swing of the settings
 
     turn    1 - 0.6 u of the left legs, 1 + 0.6 u of the right ones: to the left where u > 0
     speed   0.7 + 0.5 u of all legs
+
+times those with which the robot walks straight ahead.
 """
 
 from collections.abc import Callable, Sequence
@@ -15,7 +17,7 @@ import numpy.typing as npt
 
 from mcmj.metrics import orbits
 from mcmj.robots.trunk import Trunk, muscle_target, side
-from mcmj.robots.trunk_walker import has_fallen, poses, walk
+from mcmj.robots.trunk_walker import SAMPLE, has_fallen, new_robot, poses, stand, walk
 from mcmj.robots.walk_metrics import Walk, headings, joined
 from mcmj.simulation.reservoir import Reservoir
 from mcmj.targets.gaits import LEGS
@@ -27,13 +29,49 @@ from mcmj.utils.validation import Array
 LEVELS = (-1.0, 0.0, 1.0)  # of u, whose cycles are known; between them they are interpolated
 RAMP = 0.5  # s, from one value of u to the next
 TELL = 0.1  # s, between an operator's commands
+# how strides are straightened: short walks [s], so many; degrees a second of unequal strides, as a
+# first guess; the most unequal ones
+WALK, WALKS, SLOPE, STEEPEST = 6.0, 4, 50.0, 0.6
 
 
 def strides(steer: str, u: float) -> Array:
     """Of the legs (n_legs,), over the swing of the settings."""
-    if steer == "speed":
-        return np.full(len(LEGS), 0.7 + 0.5 * u)
-    return np.array([1.0 - 0.6 * u * side(leg) for leg in LEGS])
+    return np.full(len(LEGS), 0.7 + 0.5 * u) if steer == "speed" else uneven(0.6 * u)
+
+
+def straight_strides(trunk: Trunk, gait: str, pace: float) -> Array:
+    """Of the legs (n_legs,), with which a robot walks straight ahead under a teacher.
+
+    The legs of a random trunk do not pull alike. 1 - e of the left legs and 1 + e of the right
+    ones, e by the secant method from how the robot turns in short walks; the best one counts.
+    """
+    robot, tried = new_robot(trunk), dict[float, float]()
+    stand(robot)
+    start, e = robot.snapshot(), 0.0
+    for _ in range(WALKS):
+        robot.restore(start)
+        tried[e] = _turning(robot, trunk, muscle_target(trunk, gait, pace, uneven(e)))
+        (e0, rate0), (e1, rate1) = (list(tried.items())[-2:] * 2)[:2]
+        slope = (rate1 - rate0) / (e1 - e0) if e1 != e0 else SLOPE
+        e = float(np.clip(e - tried[e] / max(slope, SLOPE / 4), -STEEPEST, STEEPEST))
+        if e in tried:
+            break
+    return uneven(min(tried, key=lambda e: abs(tried[e])))
+
+
+def uneven(e: float) -> Array:
+    """Strides (n_legs,), of the left legs 1 - e, of the right ones 1 + e."""
+    return np.array([1.0 - e * side(leg) for leg in LEGS])
+
+
+def _turning(robot: Reservoir, trunk: Trunk, target: Target) -> float:
+    """Of a robot under a teacher, to the left [deg/s]; infinite if it blows up."""
+    step, every = robot.timestep, round(SAMPLE / robot.timestep)
+    times = step * np.arange(round(WALK / step))
+    told = np.minimum(1.0, times / RAMP)[:, None] * target.sample(times)
+    run = robot.rollout(offset=told, gate=0.0, record=("qpos",)).thinned(every)
+    heading = headings(poses(trunk, run.get("qpos")))[len(run) // 3 :]
+    return float(np.degrees(heading[-1] - heading[0])) / (SAMPLE * (len(heading) - 1))
 
 
 @dataclass(frozen=True)
@@ -66,7 +104,8 @@ def steered_gait(
         duration, hold: of the course, and of each value in it [s], in whole strides.
     """
     steer = trunk.settings.steer
-    cycles = {u: muscle_target(trunk, gait, pace, strides(steer, u)) for u in LEVELS}
+    straight = straight_strides(trunk, gait, pace)
+    cycles = {u: muscle_target(trunk, gait, pace, straight * strides(steer, u)) for u in LEVELS}
     period = cycles[0.0].period
     hold = period * max(1, round(hold / period))
     values = stream(seed, "task_inputs").uniform(-1.0, 1.0, max(2, round(duration / hold)))

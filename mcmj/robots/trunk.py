@@ -19,7 +19,7 @@ import numpy.typing as npt
 from mcmj.core.body import Body
 from mcmj.core.random_body import MOST_NODES, Range, delaunay_springs, log_uniform
 from mcmj.robots.leg_readouts import lift_of
-from mcmj.targets.gaits import LEGS, POINTS, gait_target
+from mcmj.targets.gaits import GAITS, LEGS, POINTS, gait_target
 from mcmj.targets.limit_cycles import Target, from_array
 from mcmj.utils.errors import InvalidArgumentError
 from mcmj.utils.seeds import stream
@@ -63,7 +63,7 @@ class TrunkSettings:
         muscle_strength: largest force of a change of length [N].
         swing: amplitude of a foot's way, forth and back [m].
         lift: of a foot in the middle of its swing [m].
-        lag: of the lift behind the swing, over a period.
+        lags: of the lift behind the swing, over a period, in the order of mcmj.targets.gaits.GAITS.
         steer: what an input of the robot does, in space: "turn", forces from side to side that
             bend the trunk, or "speed", forces along it that stretch it; "": there is none. They
             have no resultant and no moment.
@@ -93,7 +93,7 @@ class TrunkSettings:
     muscle_strength: float = 2000.0
     swing: float = 0.1
     lift: float = 0.07
-    lag: float = 0.0
+    lags: tuple[float, ...] = (0.0,) * len(GAITS)
     steer: str = ""
     steer_force: float = 120.0
 
@@ -101,12 +101,16 @@ class TrunkSettings:
         require_count("nodes", self.nodes, 1 + len(_hips(self)[0]), MOST_NODES)
         if self.steer:
             require_names("steer", (self.steer,), STEERS)
+        if len(self.lags) != len(GAITS):
+            raise InvalidArgumentError("lags", f"{len(GAITS)} numbers", self.lags)
+        for lag in self.lags:
+            require_number("lags", lag, -1.0, 1.0)
         for field in fields(self):
             if field.name in ("k1", "k3", "d1", "d3"):
                 require_range(field.name, getattr(self, field.name))
-            elif field.name in ("depth", "lag"):
-                require_number(field.name, getattr(self, field.name), 0.0)
-            elif field.name not in ("nodes", "steer"):
+            elif field.name == "depth":
+                require_number("depth", self.depth, 0.0)
+            elif field.name not in ("nodes", "steer", "lags"):
                 require_number(field.name, getattr(self, field.name), 0.0, open_low=True)
         if 4 * self.hip >= self.width and not self.depth:
             raise InvalidArgumentError("hip", f"less than width / 4 = {self.width / 4}", self.hip)
@@ -264,7 +268,8 @@ def muscle_target(trunk: Trunk, gait: str, pace: float, stride: object = 1.0) ->
     cycle = gait_target(gait)
     swing = cycle.orbit(POINTS)
     lift = lift_of(np.vstack([swing] * 3))[POINTS : 2 * POINTS]  # no ends
-    lift = np.roll(lift, round(trunk.settings.lag * POINTS), axis=0)
+    lag = trunk.settings.lags[list(GAITS).index(gait)]
+    lift = np.roll(lift, round(lag * POINTS), axis=0)
     lengths = muscle_lengths(trunk, np.asarray(stride) * swing, lift)
     return from_array(gait, lengths, cycle.period / pace / POINTS)
 

@@ -15,8 +15,8 @@ from mcmj.utils.validation import require_names, require_number
 SPATIAL = TrunkSettings(
     height=0.4, depth=0.5, leg=0.38, hip=0.44, stance=0.5, mass=26.0,
     d1=(80.0, 720.0), d3=(250.0, 550.0), foot=0.03,
-    muscle_stiffness=6570.0, muscle_damping=80.0, muscle_strength=600.0,
-    swing=0.076, lift=0.045, lag=0.12,
+    muscle_stiffness=6570.0, muscle_damping=105.0, muscle_strength=600.0,
+    swing=0.076, lift=0.045, lags=(0.1, 0.14, 0.18, 0.22),
 )  # fmt: skip
 PARTS = (
     "regression", "practice", "rest", "push", "switch", "steps", "energy", "controls", "ground",
@@ -60,7 +60,7 @@ class Config(trunk.Config):
     known_parts: ClassVar[tuple[str, ...]] = PARTS
 
     parts: tuple[str, ...] = PARTS
-    pace: float = 16.0
+    pace: float = 15.0
     impulses: tuple[float, ...] = (20.0, 40.0, 60.0)
     survive: float = 6.0
     steps_ms: tuple[float, ...] = (0.2, 0.4)
@@ -73,7 +73,9 @@ class Config(trunk.Config):
     gain: float = 2.0
     trunk: TrunkSettings = SPATIAL
     learning: ForceLearning = field(
-        default_factory=lambda: ForceLearning(period=2e-3, ridge=1e-3, rounds=3, trial=10.0)
+        default_factory=lambda: ForceLearning(
+            period=2e-3, ridge=1e-3, noise=0.03, rounds=3, round_duration=15.0, trial=10.0
+        )
     )
 
     def __post_init__(self) -> None:
