@@ -24,6 +24,8 @@ if TYPE_CHECKING:
     from mcmj.mjcf.read import from_mjcf as from_mjcf
     from mcmj.mjcf.write import to_mjcf as to_mjcf
     from mcmj.pictures.film_of import film as film
+    from mcmj.pictures.plots import plot_body as plot_body
+    from mcmj.pictures.plots import plot_run as plot_run
     from mcmj.simulation.ensemble import Ensemble as Ensemble
     from mcmj.simulation.phases import Phase as Phase
     from mcmj.simulation.phases import RandomForces as RandomForces
@@ -54,6 +56,8 @@ _PLACES = {
     "fit_readout": "learning.regression",
     "force_learn": "learning.force_learning",
     "from_mjcf": "mjcf.read",
+    "plot_body": "pictures.plots",
+    "plot_run": "pictures.plots",
     "random_body": "core.random_body",
     "run_schedule": "simulation.run_phases",
     "target": "targets.limit_cycles",

@@ -9,7 +9,7 @@ import pytest
 
 ROOT = Path(__file__).parent.parent
 README = ROOT / "README.md"
-PAGES = [README, *sorted((ROOT / "docs").glob("*.md"))]
+PAGES = [README, *sorted((ROOT / "docs").rglob("*.md"))]
 EXAMPLE = re.compile(r"```python\n(.*?)```\s*```text\n(.*?)```", re.S)
 EXAMPLES = [
     pytest.param(code, shown, id=f"{page.stem}-{number}")
@@ -32,14 +32,14 @@ def test_examples_print_the_results_shown(code, shown, tmp_path):
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
 def test_commands_and_linked_files_exist(page):
     text = page.read_text()
-    for name in set(re.findall(r"sh scripts/run\.sh (\w+)", text)) - {"test"}:
+    for name in set(re.findall(r"^(?:sh scripts/run\.sh|mcmj) (\w+)", text, re.M)) - {"test"}:
         assert (ROOT / "scripts" / f"{name}.py").is_file(), name
     for link in re.findall(r"\]\(([^)#]+)\)", text):
         assert link.startswith("http") or (page.parent / link).is_file(), link
 
 
 def test_the_tests_of_the_promises_exist():
-    page = (ROOT / "docs" / "trust.md").read_text()
+    page = (ROOT / "docs" / "reliability.md").read_text()
     for row in re.findall(r"^\|.*\|$", page, re.M)[2:]:
         path = None
         named = re.findall(r"`(tests/[\w/]+\.py)?(?:::(\w+))?`", row.split("|")[3])

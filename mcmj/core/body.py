@@ -157,6 +157,17 @@ def spring_lengths(positions: Array, springs: npt.NDArray[np.int64]) -> Array:
     return found
 
 
+def damper_reach(body: Body) -> Array:
+    """r (L,) [1/kg]: over a spring's free ends, the sum of their numbers of springs / mass.
+
+    No motion of the body is damped faster than max_j r_j q'(x2_j), whatever its shape: row sums
+    bound the eigenvalues of M^-1 D, D = sum_j q'(x2_j) J_j^T J_j with |J_j| = 1 at either end.
+    """
+    springs_of = np.bincount(body.springs.ravel(), minlength=body.n_nodes)
+    found: Array = np.where(body.fixed, 0.0, springs_of / body.masses)[body.springs].sum(axis=1)
+    return found
+
+
 def require_plane(body: Body, what: str) -> None:
     """Raise unless a body is planar and pushed along x, which is all that `what` knows.
 

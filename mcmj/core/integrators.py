@@ -17,7 +17,7 @@ class Integrator:
 
     Attributes:
         name: in mcmj.
-        mujoco_name: of the integrator that MuJoCo runs.
+        mujoco_name: of the integrator that MuJoCo runs; empty if only the twin takes such steps.
         twin: the compiled twin's method; empty without one.
         order: of accuracy in the step, for forces that are smooth.
         implicit: solves for the springs' forces at the end of the step, by their derivatives.
@@ -42,20 +42,19 @@ class Integrator:
         return self.name != self.mujoco_name
 
 
-INTEGRATORS = {
-    row.name: row
-    for row in (
-        Integrator("Euler", "Euler", twin="semi_implicit_euler"),
-        Integrator("RK4", "RK4", twin="rk4", order=4, stages=4),
-        Integrator("implicit", "implicit", implicit=True, advised=False),
-        Integrator("implicitfast", "implicitfast", implicit=True, advised=False),
-        Integrator("discrete", "discrete", implicit=True),
-        Integrator("leapfrog", "Euler", twin="leapfrog", order=2, damping_factor=4.0),
-    )
-}
-TWINS = {row.twin: row for row in INTEGRATORS.values() if row.twin}
+_ROWS = (
+    Integrator("Euler", "Euler", twin="semi_implicit_euler"),
+    Integrator("RK4", "RK4", twin="rk4", order=4, stages=4),
+    Integrator("implicit", "implicit", implicit=True, advised=False),
+    Integrator("implicitfast", "implicitfast", implicit=True, advised=False),
+    Integrator("discrete", "discrete", implicit=True),
+    Integrator("leapfrog", "Euler", twin="leapfrog", order=2, damping_factor=4.0),
+    Integrator("adaptive_leapfrog", "", twin="adaptive_leapfrog", order=2, damping_factor=4.0),
+)
+INTEGRATORS = {row.name: row for row in _ROWS if row.mujoco_name}
+TWINS = {row.twin: row for row in _ROWS if row.twin}
 TWINNED = {row.name: row for row in TWINS.values()}
-DEFAULT_INTEGRATOR = "Euler"
+DEFAULT_INTEGRATOR = "leapfrog"
 
 
 def integrator_named(

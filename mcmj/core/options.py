@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from mcmj.core.callbacks.spring_laws import NATIVE, SpringLaw
-from mcmj.core.integrators import DEFAULT_INTEGRATOR, TWINNED, integrator_named
+from mcmj.core.integrators import DEFAULT_INTEGRATOR, INTEGRATORS, TWINNED, integrator_named
 from mcmj.utils.errors import InvalidArgumentError, UnknownNameError
 from mcmj.utils.validation import require_count, require_timestep
 
@@ -34,6 +34,8 @@ class Options:
             raise UnknownNameError("engine", self.engine, ENGINES)
         if self.engine == "twin":
             self._check_twin()
+        elif self.integrator in TWINNED and self.integrator not in INTEGRATORS:
+            raise InvalidArgumentError("engine", f"'twin' for {self.integrator}", self.engine)
         elif integrator_named(self.integrator).stages > 1 and self.feedback_delay:
             raise InvalidArgumentError(
                 "feedback_delay",

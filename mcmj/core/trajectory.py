@@ -25,7 +25,7 @@ class State:
         time: [s].
         previous_lengths: (L,) spring lengths one step earlier [m] (toolbox scheme only).
         pending_output: (n_outputs,) output still to be fed back (toolbox scheme only).
-        history: (N, 3 D + 1), the reference's leapfrog only: `velocities` again, the velocities
+        history: (N, 3 D + 1), the reference's leapfrogs only: `velocities` again, the velocities
             that dampers see next and those half a step back [m/s], the last push [N]. Whoever
             changes `velocities` makes it void: the scheme then starts anew from them.
     """

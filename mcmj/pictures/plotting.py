@@ -63,7 +63,7 @@ def save(figure: Figure, path: str | Path) -> None:
         figure.savefig(temporary, dpi=130, format="png", pil_kwargs={"compress_level": 3})
 
 
-def plot_body(axes: Axes, body: Body) -> None:
+def draw_network(axes: Axes, body: Body) -> None:
     """The network: springs, and nodes in the colours of their roles, with a legend.
 
     A body in space is seen along z.

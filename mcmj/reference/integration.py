@@ -1,12 +1,13 @@
 """Reference integrators, sharing no code with MuJoCo's path.
 
-dop853               SciPy's DOP853 in plain NumPy: the exact solution
-semi_implicit_euler  compiled twin of MuJoCo's Euler:  v += h F/m;  p += h v
-rk4                  compiled twin of MuJoCo's RK4
-leapfrog             compiled twin of the leapfrog (mcmj.core.callbacks.leapfrog): second order
-toolbox_euler        the authors' scheme: spring rates by backward difference,
-                     x2 = (l_k - l_{k-1}) / h with l_{-1} = l0; p += h v;  v += h F/m
-toolbox_rk           the same with p += h v + h^2 F/2m, what Runge-Kutta gives for a held force
+    dop853               SciPy's DOP853 in plain NumPy: the exact solution
+    semi_implicit_euler  compiled twin of MuJoCo's Euler:  v += h F/m;  p += h v
+    rk4                  compiled twin of MuJoCo's RK4
+    leapfrog             compiled twin of the leapfrog (mcmj.core.callbacks.leapfrog): second order
+    adaptive_leapfrog    the same in steps as short as the dampers ask for (`twin.adaptive`)
+    toolbox_euler        the authors' scheme: spring rates by backward difference,
+                         x2 = (l_k - l_{k-1}) / h with l_{-1} = l0; p += h v;  v += h F/m
+    toolbox_rk           the same with p += h v + h^2 F/2m, what Runge-Kutta gives for a held force
 
 In the toolbox schemes the output y_k = W_out^T l_k is fed back at step k + 1. Bodies in space, and
 those pushed along another direction than x, run by the same schemes in plain NumPy (`plain_steps`).

@@ -1,7 +1,8 @@
 """The fixed-step references in plain NumPy: slow, for bodies that the compiled twins do not know.
 
 Those are bodies in space, and bodies pushed along another direction than x. The schemes are those
-of `mcmj.reference.integration`; the leapfrog is that of `mcmj.core.callbacks.leapfrog`.
+of `mcmj.reference.integration`; the leapfrog is that of `mcmj.core.callbacks.leapfrog`, the
+adaptive one that of `mcmj.reference.twin.adaptive`.
 """
 
 from collections.abc import Callable
@@ -9,11 +10,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from mcmj.core.body import Body, spring_lengths
+from mcmj.core.body import Body, damper_reach, spring_lengths
 from mcmj.core.readout import Readout
 from mcmj.core.rollout_arguments import Drive
 from mcmj.core.trajectory import State, Trajectory
 from mcmj.reference.dop853 import accelerations, held_push
+from mcmj.reference.twin.adaptive import MOST_PARTS, TOO_FAST
 from mcmj.utils.errors import DivergenceError
 from mcmj.utils.validation import Array
 
@@ -67,10 +69,15 @@ def _rk4(body: Body, state: State, push: Array, h: float) -> State:
     return State(p + h / 6 * moved, v1 + h / 6 * kicked)
 
 
+def _memory(state: State) -> Array | None:
+    """The leapfrogs' `history` (v, V, w, f) side by side, if it belongs to the velocities."""
+    past, v = state.history, state.velocities
+    return past if past is not None and np.array_equal(past[:, : v.shape[1]], v) else None
+
+
 def _leapfrog(body: Body, state: State, push: Array, h: float) -> State:
-    """`history` is (v, V, w, f) side by side, as the compiled twin's."""
-    p, v, past, d = state.positions, state.velocities, state.history, body.dimensions
-    if past is None or not np.array_equal(past[:, :d], v):
+    p, v, past, d = state.positions, state.velocities, _memory(state), body.dimensions
+    if past is None:
         seen, half, before, share = v, v, np.zeros_like(push), 0.5
     else:
         seen, half, before, share = past[:, d : 2 * d], past[:, 2 * d : 3 * d], past[:, -1], 1.0
@@ -82,6 +89,33 @@ def _leapfrog(body: Body, state: State, push: Array, h: float) -> State:
     v = half + h / 2 * total
     history = np.column_stack([v, half + kick / 2, half, push])
     return State(p + h * half, v, history=history)
+
+
+def _adaptive_leapfrog(body: Body, state: State, push: Array, h: float) -> State:
+    past, d = _memory(state), body.dimensions
+    p, v = state.positions, state.velocities if past is None else past[:, d : 2 * d]
+    if h * _damper_rate(body, p, v) <= TOO_FAST:
+        return _leapfrog(body, state, push, h)
+    half, rest, part = v, h, 0.0
+    for _ in range(MOST_PARTS):
+        left = max(1.0, np.ceil(rest * _damper_rate(body, p, v) / TOO_FAST))
+        before, part = part, rest / left
+        a = accelerations(body, p, v, push)
+        half = half + (before + part) / 2 * a
+        p, v = p + part * half, half + part / 2 * a
+        rest = rest - part if left > 1.0 else 0.0
+        if rest <= 0.0:
+            break
+    a = accelerations(body, p, v, push)
+    v = half + part / 2 * a if rest == 0.0 else np.full_like(v, np.nan)
+    return State(p, v, history=np.column_stack([v, v, v - h / 2 * a, push]))
+
+
+def _damper_rate(body: Body, p: Array, v: Array) -> float:
+    tail, head = body.springs.T
+    gap, closing = p[head] - p[tail], v[head] - v[tail]
+    x2 = (gap * closing).sum(axis=1) / np.linalg.norm(gap, axis=1)
+    return float((damper_reach(body) * (body.d1 + 3.0 * body.d3 * x2 * x2)).max())
 
 
 def _toolbox(body: Body, state: State, push: Array, h: float, shift: float) -> State:
@@ -96,6 +130,7 @@ STEPS: dict[str, Step] = {
     "semi_implicit_euler": _euler,
     "rk4": _rk4,
     "leapfrog": _leapfrog,
+    "adaptive_leapfrog": _adaptive_leapfrog,
     "toolbox_euler": lambda body, state, push, h: _toolbox(body, state, push, h, 0.0),
     "toolbox_rk": lambda body, state, push, h: _toolbox(body, state, push, h, 0.5),
 }

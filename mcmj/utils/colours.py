@@ -28,7 +28,7 @@ MUSCLE_COLOUR = PURPLE
 INTEGRATOR_COLOURS = {
     "Euler": BLACK, "leapfrog": RED, "RK4": BLUE, "discrete": GREEN, "implicit": BROWN,
     "implicitfast": SAND, "toolbox_euler": LILAC, "toolbox_rk": PINK, "Euler_hook": GREY,
-    "RK4_hook": PALE_BLUE,
+    "RK4_hook": PALE_BLUE, "adaptive_leapfrog": ORANGE,
 }  # fmt: skip
 
 # nodes, as in the paper's Figs. 2 and 5m

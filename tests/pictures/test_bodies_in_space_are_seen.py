@@ -10,7 +10,7 @@ from mcmj.mjcf.appearance import CAMERA_ANGLE, camera_of, node_colour
 from mcmj.mjcf.read import load_model
 from mcmj.pictures.film import Film
 from mcmj.pictures.opengl import RenderingUnavailableError
-from mcmj.pictures.plotting import new_figure, plot_body
+from mcmj.pictures.plotting import draw_network, new_figure
 from mcmj.pictures.rendering import HEIGHT, WIDTH, Style, body_view, film_frames
 from mcmj.utils.colours import strain_colours
 
@@ -90,5 +90,5 @@ def test_a_film_in_space(style):
 
 def test_plot_of_the_body_has_its_axes_named():
     axes = new_figure(4, 4).add_subplot()
-    plot_body(axes, space_body())
+    draw_network(axes, space_body())
     assert (axes.get_xlabel(), axes.get_ylabel()) == ("x [m]", "y [m]")

@@ -97,7 +97,7 @@ def test_what_the_twin_does_not_do_is_named(body):
         with pytest.raises(InvalidArgumentError) as caught:
             mcmj.Simulation(body, engine="twin", **options)
         assert str(caught.value) == text
-    with pytest.raises(UnknownNameError, match="Euler, RK4, leapfrog"):
+    with pytest.raises(UnknownNameError, match="Euler, RK4, adaptive_leapfrog, leapfrog"):
         mcmj.Simulation(body, engine="twin", integrator="discrete")
     with pytest.raises(UnknownNameError, match="mujoco, tendons, twin"):
         mcmj.Simulation(body, engine="jax")

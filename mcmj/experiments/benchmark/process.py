@@ -19,7 +19,7 @@ def machine() -> dict[str, object]:
         "platform": platform.platform(),
         "processor": _processor_name(),
         "cores": os.cpu_count(),
-        "load_average_1min": os.getloadavg()[0],
+        "load_average_1min": os.getloadavg()[0] if hasattr(os, "getloadavg") else None,
     }
 
 
@@ -42,8 +42,8 @@ def start_up(config: Config, body: Body) -> dict[str, object]:
 
 
 def memory(config: Config, body: Body) -> dict[str, object]:
-    """Peak resident memory of a process that streams a long closed-loop run, in MB."""
-    if config.memory_steps == 0:
+    """Peak resident memory of a process that streams a long closed-loop run, in MB; on Linux."""
+    if config.memory_steps == 0 or sys.platform != "linux":
         return {"million_step_peak_mb": None}
     code = (
         "import numpy as np, mcmj\n"

@@ -9,11 +9,11 @@ from mcmj.pictures.plotting import (
     TITLES,
     best_phase,
     count_in_whole_numbers,
+    draw_network,
     draw_outputs,
     draw_phase_plane,
     new_figure,
     output_handles,
-    plot_body,
 )
 from mcmj.utils.colours import GROUP_COLOURS, TARGET_COLOUR
 
@@ -54,7 +54,7 @@ def limit_cycle_figure(result: Result) -> Figure:
         if row == 0:
             handles = output_handles(outputs.shape[1])
             figure.legend(handles=handles, loc="outside upper center", ncols=3, frameon=False)
-    plot_body(figure.add_subplot(grid[:, 3]), result.body)
+    draw_network(figure.add_subplot(grid[:, 3]), result.body)
     return figure
 
 

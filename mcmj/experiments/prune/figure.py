@@ -6,7 +6,7 @@ from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 
 from mcmj.experiments.prune.result import Result
-from mcmj.pictures.plotting import new_figure, plot_body
+from mcmj.pictures.plotting import draw_network, new_figure
 from mcmj.utils.colours import GROUP_COLOURS, TARGET_COLOUR
 
 ORDERS = {
@@ -59,7 +59,7 @@ def _draw_sensors(axes: Axes, result: Result) -> None:
     """The first body, with the fewest springs that suffice in black."""
     method, first = result.config.methods[0], result.bodies[0]
     sensed = first.orders[method][: result.needed(method, 0) or 0]
-    plot_body(axes, first.body)
+    draw_network(axes, first.body)
     lines = first.body.positions[first.body.springs[sensed], :2]
     axes.add_collection(LineCollection(list(lines), colors="black", linewidths=2.2, zorder=1))
     axes.set_title(f"{len(lines)} of {first.body.n_springs} springs (black) suffice")

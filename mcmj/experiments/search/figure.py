@@ -12,7 +12,7 @@ from matplotlib.ticker import LogLocator, NullFormatter
 
 from mcmj.experiments.search.result import Result, setting_label
 from mcmj.mjcf.read import from_mjcf
-from mcmj.pictures.plotting import TITLES, count_in_whole_numbers, new_figure, plot_body
+from mcmj.pictures.plotting import TITLES, count_in_whole_numbers, draw_network, new_figure
 from mcmj.search.experiment import Score
 from mcmj.utils.colours import GROUP_COLOURS, TARGET_COLOUR
 from mcmj.utils.validation import Array
@@ -135,7 +135,7 @@ def best_bodies_figure(result: Result) -> Figure:
     panels = figure.subplots(1, len(result.bodies), squeeze=False)[0]
     for axes, xml, index in zip(panels, result.bodies, result.ranking, strict=False):
         body, _ = from_mjcf(xml)
-        plot_body(axes, body)
+        draw_network(axes, body)
         title = result.title(int(index))
         axes.set_title(f"{title}\n{body.n_nodes} nodes, {body.n_springs} springs")
     return figure

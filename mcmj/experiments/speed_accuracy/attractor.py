@@ -1,7 +1,7 @@
 """What the integrator does to the learned attractor: taught under one, run under another."""
 
 from mcmj.core.body import Body
-from mcmj.core.integrators import TWINNED
+from mcmj.core.integrators import INTEGRATORS
 from mcmj.learning.lessons import Teaching
 from mcmj.learning.teaching import synchronise, teach
 from mcmj.metrics.orbits import orbit_error
@@ -18,15 +18,15 @@ def attractor_errors(body: Body, *, seed: int) -> dict[str, dict[str, float]]:
     Each run starts from clean teacher forcing under B; the error is that of the last WINDOW
     seconds of a free run. The twin agrees with MuJoCo to rounding and is some twenty times faster.
     """
-    teaching = Teaching()
+    teaching, twinned = Teaching(), [row.name for row in INTEGRATORS.values() if row.twin]
     table: dict[str, dict[str, float]] = {}
     for name in TARGETS:
         goal = target(name)
         table[name] = {}
-        for taught in TWINNED:
+        for taught in twinned:
             teacher = Simulation(body, integrator=taught, engine="twin")
             fit = teach(teacher, goal, teaching, seed)
-            for run in TWINNED:
+            for run in twinned:
                 simulation = Simulation(body, integrator=run, engine="twin")
                 synchronise(simulation, goal, teaching.washout)
                 simulation.set_readout(fit.w_out)

@@ -13,6 +13,7 @@ from mcmj.utils.colours import GREY, INTEGRATOR_COLOURS, Colour
 STYLES = {  # integrator, whose colour it is, and marks; dashed: the twins
     "mujoco_Euler_hook": ("Euler_hook", "o:"),
     "mujoco_RK4_hook": ("RK4_hook", "D:"),
+    "twin_adaptive_leapfrog": ("adaptive_leapfrog", "*--"),
     "twin_toolbox_euler": ("toolbox_euler", "x--"),
     "twin_toolbox_rk": ("toolbox_rk", "+--"),
 }

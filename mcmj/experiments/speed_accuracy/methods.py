@@ -9,6 +9,7 @@ from mcmj.core.trajectory import State
 from mcmj.reference.integration import integrate
 from mcmj.reference.twin.population import Population
 from mcmj.reference.twin.stepping import METHODS as TWINS
+from mcmj.reference.twin.stepping import scheme_of
 from mcmj.simulation.simulation import Simulation
 from mcmj.utils.errors import StabilityWarning
 from mcmj.utils.timing import Work
@@ -50,6 +51,12 @@ def final_state(
     return simulation.state
 
 
+def adaptive(method: str) -> bool:
+    """Whether the cost of a step depends on its length and on the motion."""
+    engine, name = method.split("_", 1)
+    return engine == "twin" and scheme_of(name, SHORT_STEP).adaptive
+
+
 def stepping(body: Body, method: str, steps: int) -> Work:
     """Work of so many steps from rest, loop open, nothing recorded."""
     engine, name = method.split("_", 1)
@@ -59,6 +66,21 @@ def stepping(body: Body, method: str, steps: int) -> Work:
     population = Population([body], [None], method=name, timestep=SHORT_STEP)
     drive = check_drive(body, steps=steps, closed=False)
     return lambda: population.run(drive, 0, steps, lengths=False)
+
+
+def moving(
+    body: Body, method: str, step_ms: float, steps: int, start: State, forces: Array
+) -> Work:
+    """Work of a twin's steps from a start under constant forces, nothing recorded."""
+    name = method.split("_", 1)[1]
+    population = Population([body], [None], method=name, timestep=1e-3 * step_ms)
+    drive = check_drive(body, steps=steps, forces=forces, closed=False)
+
+    def work() -> None:
+        population.set_states([start])
+        population.run(drive, 0, steps, lengths=False)
+
+    return work
 
 
 def _simulation(body: Body, name: str, timestep: float) -> Simulation:

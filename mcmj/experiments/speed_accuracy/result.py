@@ -32,7 +32,8 @@ class Result:
 
     Attributes:
         cells: [body][method][step_ms].
-        orders: observed order by method; None where too few steps were usable.
+        orders: observed order by method; None where too few steps were usable, or parts of steps
+            set the error.
         self_consistency: by body, how far DOP853 at rtol 1e-12 is from a run at 5e-13.
         attractor: [task]["A_to_B"] orbit errors of readouts taught under A and run under B.
     """

@@ -2,7 +2,8 @@
 
 Each body is kicked and pulled by constant forces, loop open. The error is the relative
 position error |p - p*| / |p* - p(0)| at a horizon, p* by DOP853; the cost is that of a simulated
-second, as microseconds and as a ratio to MuJoCo's Euler at 1 ms, measured in turns.
+second, as microseconds and as a ratio to MuJoCo's Euler at 1 ms, measured in turns: of steps
+from rest, or of the whole run where a method takes as many parts of a step as the motion asks for.
 """
 
 from collections.abc import Callable
@@ -14,7 +15,7 @@ from mcmj.core.body import Body
 from mcmj.core.trajectory import State
 from mcmj.experiments.speed_accuracy.attractor import attractor_errors
 from mcmj.experiments.speed_accuracy.config import BODIES, Config
-from mcmj.experiments.speed_accuracy.methods import final_state, stepping
+from mcmj.experiments.speed_accuracy.methods import adaptive, final_state, moving, stepping
 from mcmj.experiments.speed_accuracy.result import Cell, Result
 from mcmj.metrics.convergence import observed_order
 from mcmj.mjcf.bundled import body_path
@@ -36,7 +37,7 @@ def run(config: Config, *, on_steps: OnSteps = lambda steps: None) -> Result:
     for name in config.bodies:
         cells[name], consistency[name] = _run_body(config, BODIES[name](config.seed))
         on_steps(1)
-    orders = {m: observed_order(cells, m) for m in config.methods}
+    orders = {m: None if adaptive(m) else observed_order(cells, m) for m in config.methods}
     attractor = {}
     if config.attractor:
         attractor = attractor_errors(from_mjcf(body_path("general"))[0], seed=0)
@@ -48,7 +49,7 @@ def _run_body(config: Config, body: Body) -> tuple[dict[str, dict[float, Cell]],
     forces = stream(config.seed, "forces").uniform(-config.force, config.force, body.n_nodes)
     goals = [_reference(body, start, forces, t, 1e-12) for t in config.horizons]
     tighter = _reference(body, start, forces, config.horizons[-1], TIGHTER)
-    costs = _costs_per_step(config, body)
+    costs = _costs_per_step(config, body, start, forces)
     cells: dict[str, dict[float, Cell]] = {}
     for method in config.methods:
         cells[method] = {}
@@ -59,8 +60,8 @@ def _run_body(config: Config, body: Body) -> tuple[dict[str, dict[float, Cell]],
             cells[method][step_ms] = Cell(
                 position_errors=errors,
                 length_error=length_error,
-                us_per_second=costs[method] * per_second * 1e6,
-                cost_ratio=costs[method] / costs[BASE] / step_ms,
+                us_per_second=costs[method, step_ms] * per_second * 1e6,
+                cost_ratio=costs[method, step_ms] / costs[BASE, step_ms] / step_ms,
             )
     return cells, _relative(goals[-1].positions, tighter.positions, body.positions)
 
@@ -116,9 +117,20 @@ def _relative(found: Array, goal: Array, origin: Array) -> float:
     return error if np.isfinite(error) else np.inf
 
 
-def _costs_per_step(config: Config, body: Body) -> dict[str, float]:
-    """Median seconds of a step at 1 ms from rest, open loop, nothing recorded, in turns."""
-    steps = max(20, 30_000 // body.n_springs)
-    works = {method: stepping(body, method, steps) for method in {BASE, *config.methods}}
+def _costs_per_step(
+    config: Config, body: Body, start: State, forces: Array
+) -> dict[tuple[str, float], float]:
+    """Median seconds of a step by method and step [ms], open loop, nothing recorded, in turns."""
+    count = max(20, 30_000 // body.n_springs)
+    works, cells = {}, []
+    for method in {BASE, *config.methods}:
+        for step in config.steps_ms:
+            name, steps = method, count
+            if adaptive(method):
+                name, steps = f"{method} {step}", round(1e3 * config.horizons[-1] / step)
+                works[name] = moving(body, method, step, steps, start, forces)
+            elif name not in works:
+                works[name] = stepping(body, method, steps)
+            cells.append((method, step, name, steps))
     seconds = interleaved_seconds(works, config.repeats)
-    return {method: float(np.median(s)) / steps for method, s in seconds.items()}
+    return {(m, step): float(np.median(seconds[name])) / n for m, step, name, n in cells}

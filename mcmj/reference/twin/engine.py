@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from mcmj.core.body import Body, spring_lengths
-from mcmj.core.integrators import integrator_named
+from mcmj.core.integrators import TWINNED
 from mcmj.core.options import Options
 from mcmj.core.rollout_arguments import Drive
 from mcmj.core.trajectory import State
@@ -32,7 +32,7 @@ class TwinEngine:
         self._population = Population(
             [body] * copies,
             [None] * copies,
-            method=integrator_named(integrator).twin,
+            method=TWINNED[integrator].twin,
             timestep=timestep,
             threads=threads,
             packed=copies >= 4,

@@ -8,31 +8,27 @@ depend neither on the batch it is in nor on the number of threads. Each step eva
     y_c = bias_c + sum_j w_out[c, j] l_j
     F_x,i = pulls + f_i + sum_c w_in[c, i] u_c + w_fb[c, i] (gate_c y_c + offset_c)
 
-Springs are taken four at a time; a body with L springs computes blocks = ceil(L / 4) of
-them, the last filled up with springs of no stiffness. A node's row is (p_x, p_y, v_x, v_y).
+A node's row is (p_x, p_y, v_x, v_y).
 """
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 from numba import njit
 
+from mcmj.reference.twin.adaptive import TOO_FAST, take_substeps
+from mcmj.reference.twin.forces import body_of, find_pulls, sum_forces
 from mcmj.reference.twin.leapfrog import advance_leapfrog, prepare_leapfrog
 from mcmj.reference.twin.rows import load_body, store_body
 from mcmj.reference.twin.stepping import (
     COMPILE,
     INLINE,
-    LEAPFROG,
     RK4,
     at_step,
     begin_rk4,
     held_step,
-    load_law,
     new_work,
     rk4_weights,
-    spring_force,
-    transpose,
     weighted_sum,
 )
 from mcmj.reference.twin.vectors import (
@@ -45,75 +41,7 @@ from mcmj.reference.twin.vectors import (
     splat2,
     splat4,
     store,
-    unpack_high,
-    unpack_low,
 )
-
-
-class Bodies(NamedTuple):
-    """B bodies in kernel layout. M, K: largest spring and node count, rounded up to
-    multiples of 8."""
-
-    nodes: np.ndarray  # (B,) int64: masses of each body
-    springs: np.ndarray  # (B,) int64
-    ends: np.ndarray  # (B, 2 M) int32: per block of 4 springs 4 tails, 4 heads; 4 x node
-    turns: np.ndarray  # (B, 3 M) int32: order of summation; 2 x (place in pulls, tail, head)
-    laws: np.ndarray  # (B, 5 M): per block 4 l0 (m), 4 k1, 4 k3, 4 d1, 4 d3 (SI)
-    mobility: np.ndarray  # (B, K): 1 / mass, 0 for fixed nodes (1/kg)
-    channels: np.ndarray  # (B, (n_in + n_out) K): w_in then w_fb, transposed
-    w_out: np.ndarray  # (B, n_out M)
-    bias: np.ndarray  # (B, n_out)
-
-
-@njit(**COMPILE)
-def body_of(bodies, b):
-    """Body b: the same fields without the leading axis."""
-    return Bodies(
-        bodies.nodes[b],
-        bodies.springs[b],
-        bodies.ends[b],
-        bodies.turns[b],
-        bodies.laws[b],
-        bodies.mobility[b],
-        bodies.channels[b],
-        bodies.w_out[b],
-        bodies.bias[b],
-    )
-
-
-@njit(**INLINE)
-def find_pulls(body, work, pulls, scheme):
-    """Replace each spring's length; pulls = force on its tail, springs 0 2 1 3 in a block."""
-    ends, rows, lengths = body.ends, work.rows, work.lengths
-    for block in range(pulls.size // 8):
-        e = 8 * block
-        gap = transpose(
-            load4(rows, ends[e + 4]) - load4(rows, ends[e]),
-            load4(rows, ends[e + 5]) - load4(rows, ends[e + 1]),
-            load4(rows, ends[e + 6]) - load4(rows, ends[e + 2]),
-            load4(rows, ends[e + 7]) - load4(rows, ends[e + 3]),
-        )
-        law, before = load_law(body.laws, 20 * block), load4(lengths, 4 * block)
-        length, f_x, f_y = spring_force(gap, law, before, scheme)
-        store(lengths, 4 * block, length)
-        store(pulls, e, unpack_low(f_x, f_y))
-        store(pulls, e + 4, unpack_high(f_x, f_y))
-
-
-@njit(**INLINE)
-def sum_forces(body, pulls, work):
-    """Add each spring's force to its ends.
-
-    Springs are visited so that neighbours in the list share no node: each addition would
-    otherwise wait for the one before it.
-    """
-    turns, force = body.turns, work.force
-    for turn in range(body.springs):
-        tail, head = turns[3 * turn + 1], turns[3 * turn + 2]
-        pull = load2(pulls, turns[3 * turn])
-        on_tail, on_head = load2(force, tail) + pull, load2(force, head) - pull
-        store(force, tail, on_tail)
-        store(force, head, on_head)
 
 
 @njit(**INLINE)
@@ -201,7 +129,7 @@ def advance(body, work, scheme, stage):
         if stage == 0:
             begin_rk4(work)
         return advance_rk4(body, work, scheme.step, stage)
-    if scheme.method == LEAPFROG:
+    if scheme.leapfrog:
         return advance_leapfrog(body, work, scheme.step)
     return advance_held(body, work, scheme)
 
@@ -218,10 +146,10 @@ def integrate_body(bodies, run, b):
     load_body(run, work, body.mobility, b, 0)
     k, total = 0, 0.0
     while k < run.steps:
-        if scheme.method == LEAPFROG:
+        if scheme.leapfrog:
             prepare_leapfrog(work, k, run.steps)
         for stage in range(scheme.stages):
-            find_pulls(body, work, pulls, scheme)
+            rate = find_pulls(body, work, pulls, scheme)
             if stage == 0:  # inputs, outputs and offsets hold for the whole step
                 if kept.shape[1] > 0:
                     for j in range(body.springs):
@@ -230,7 +158,10 @@ def integrate_body(bodies, run, b):
                 find_values(body, work, schedule, state, record, now)
                 find_push(body, work, forces, b, k)
             sum_forces(body, pulls, work)
-            total = advance(body, work, scheme, stage)
+            if scheme.adaptive and scheme.step * rate > TOO_FAST:
+                total = take_substeps(body, work, pulls, scheme, rate)
+            else:
+                total = advance(body, work, scheme, stage)
         if not math.isfinite(total):
             break
         k += 1

@@ -5,11 +5,11 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
-from mcmj.core.body import Body
+from mcmj.core.body import Body, damper_reach
 from mcmj.core.readout import Readout
 from mcmj.core.rollout_arguments import Drive
 from mcmj.core.trajectory import State
-from mcmj.reference.twin.kernels import Bodies
+from mcmj.reference.twin.forces import Bodies
 from mcmj.reference.twin.packs import Packs
 from mcmj.reference.twin.stepping import KernelDrive, KernelState, Record
 from mcmj.utils.errors import InvalidArgumentError
@@ -32,6 +32,7 @@ def to_bodies(bodies: Sequence[Body], readouts: Sequence[object]) -> Bodies:
         ends=_aligned((count, 2 * width), np.int32),
         turns=_aligned((count, 3 * width), np.int32),
         laws=_aligned((count, 5 * width)),
+        brakes=_aligned((count, 2 * width)),
         mobility=_aligned((count, nodes)),
         channels=_aligned((count, (n_in + n_out) * nodes)),
         w_out=_aligned((count, n_out * width)),
@@ -62,11 +63,14 @@ def _fill(layout: Bodies, b: int, body: Body, nodes: int, width: int) -> None:
     ends[:m] = body.springs
     laws = np.zeros((5, width))
     laws[:, :m] = body.rest_lengths, body.k1, body.k3, body.d1, body.d3
+    brakes = np.zeros((2, width))
+    brakes[:, :m] = damper_reach(body) * (body.d1, 3.0 * body.d3)
     order = _summation_order(body)
     place = 4 * (order // 4) + np.array([0, 2, 1, 3])[order % 4]  # as find_pulls stores them
     layout.ends[b] = 4 * _in_blocks(ends.T)
     layout.turns[b, : 3 * m] = 2 * np.column_stack([place, body.springs[order]]).ravel()
     layout.laws[b] = _in_blocks(laws)
+    layout.brakes[b] = _in_blocks(brakes)
     layout.mobility[b, :n] = _mobility(body)
     layout.channels[b].reshape(-1, nodes)[:, :n] = np.hstack([body.w_in, body.w_fb]).T
 

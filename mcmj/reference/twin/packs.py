@@ -68,7 +68,7 @@ def pull_nodes(pack, work, scheme):
             load4(rows, head + 12) - load4(rows, tail + 12),
         )
         law, before = load_law(pack.laws, 20 * j), load4(lengths, 4 * j)
-        length, f_x, f_y = spring_force(gap, law, before, scheme)
+        length, f_x, f_y, _ = spring_force(gap, law, before, scheme)
         store(lengths, 4 * j, length)
         tail, head = 8 * ends[j, 0], 8 * ends[j, 1]
         store(force, tail, load4(force, tail) + f_x)

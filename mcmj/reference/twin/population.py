@@ -9,7 +9,8 @@ import numpy.typing as npt
 from mcmj.core.body import Body, require_plane
 from mcmj.core.rollout_arguments import Drive
 from mcmj.core.trajectory import State
-from mcmj.reference.twin.kernels import Bodies, integrate_bodies
+from mcmj.reference.twin.forces import Bodies
+from mcmj.reference.twin.kernels import integrate_bodies
 from mcmj.reference.twin.layout import (
     blank_unused,
     empty_record,
@@ -21,7 +22,6 @@ from mcmj.reference.twin.layout import (
 )
 from mcmj.reference.twin.packs import Packs, integrate_packs
 from mcmj.reference.twin.stepping import (
-    LEAPFROG,
     METHODS,
     KernelRun,
     KernelState,
@@ -45,7 +45,8 @@ class Population:
         method: one of METHODS.
         timestep: control and integration step [s].
         threads: number of threads.
-        packed: pack them; all must have one topology.
+        packed: pack them; all must have one topology. Not with adaptive_leapfrog, whose bodies
+            take steps of their own.
 
     Raises:
         InvalidArgumentError, UnknownNameError: an argument out of bounds.
@@ -71,10 +72,10 @@ class Population:
             require_plane(body, "the compiled twins")
         self.bodies = list(bodies)
         self.method, self.timestep, self.threads = method, timestep, threads
-        self._packed = packed
+        self._packed = packed and not scheme_of(method, timestep).adaptive
         self.steps_done = 0
         self.set_states([rest(body) for body in bodies])
-        lay_out = to_packs if packed else to_bodies
+        lay_out = to_packs if self._packed else to_bodies
         self._layout: Bodies | Packs = lay_out(self.bodies, readouts)
 
     def set_readouts(self, readouts: Sequence[object]) -> None:
@@ -110,7 +111,7 @@ class Population:
         ]
 
     def _history(self, b: int, nodes: int) -> Array | None:
-        if METHODS[self.method] != LEAPFROG:
+        if not scheme_of(self.method, self.timestep).leapfrog:
             return None
         return np.hstack([self._state.velocities[b, :nodes], self._state.history[b, :nodes]])
 

@@ -9,7 +9,7 @@ import math
 
 from numba import njit
 
-from mcmj.reference.twin.stepping import COMPILE, LEAPFROG
+from mcmj.reference.twin.stepping import COMPILE
 
 
 @njit(**COMPILE)
@@ -22,7 +22,7 @@ def load_body(run, work, mobility, b, lane):
             at = width * (4 * i + axis) + lane
             work.rows[at] = positions[i, axis]
             work.rows[at + 2 * width] = moves * velocities[i, axis]
-    if run.scheme.method == LEAPFROG:
+    if run.scheme.leapfrog:
         load_history(run.state.history[b], work, lane)
 
 
@@ -34,7 +34,7 @@ def store_body(run, work, mobility, b, lane):
         for axis in range(2):
             at = width * (4 * i + axis) + lane
             positions[i, axis], velocities[i, axis] = work.rows[at], work.rows[at + 2 * width]
-    if run.scheme.method == LEAPFROG and run.steps > 0:
+    if run.scheme.leapfrog and run.steps > 0:
         store_history(run, work, mobility, b, lane)
 
 

@@ -24,8 +24,8 @@ from mcmj.reference.twin.vectors import (
 
 # methods by number; the authors' toolbox has two that MuJoCo has not
 METHODS = {name: i for i, name in enumerate((*TWINS, "toolbox_euler", "toolbox_rk"))}
-SEMI_IMPLICIT_EULER, RK4, LEAPFROG = (
-    METHODS[name] for name in ("semi_implicit_euler", "rk4", "leapfrog")
+SEMI_IMPLICIT_EULER, RK4, LEAPFROG, ADAPTIVE_LEAPFROG = (
+    METHODS[name] for name in ("semi_implicit_euler", "rk4", "leapfrog", "adaptive_leapfrog")
 )
 TOOLBOX_EULER, TOOLBOX_RK = METHODS["toolbox_euler"], METHODS["toolbox_rk"]
 
@@ -57,7 +57,7 @@ class KernelState(NamedTuple):
     velocities: np.ndarray  # (B, N, 2) m/s
     lengths: np.ndarray  # (B, M) m: lengths one step ago (toolbox methods only)
     outputs: np.ndarray  # (B, n_out): outputs one step ago (toolbox methods only)
-    history: np.ndarray  # (B, N, 5): see rows.load_history (leapfrog only)
+    history: np.ndarray  # (B, N, 5): see rows.load_history (leapfrogs only)
 
 
 class Record(NamedTuple):
@@ -76,6 +76,8 @@ class Scheme(NamedTuple):
     stages: int  # force evaluations a step
     shift: float  # see held_step
     toolbox: bool  # springs and feedback look one step back
+    leapfrog: bool  # remembers a half-step velocity and a push
+    adaptive: bool  # asks for the dampers' rate
 
 
 class KernelRun(NamedTuple):
@@ -110,7 +112,14 @@ def scheme_of(method: str, step: float) -> Scheme:
     number = METHODS[method]
     shift = {SEMI_IMPLICIT_EULER: 1.0, TOOLBOX_RK: 0.5}.get(number, 0.0)
     return Scheme(
-        number, step, 1.0 / step, 4 if number == RK4 else 1, shift, number >= TOOLBOX_EULER
+        number,
+        step,
+        1.0 / step,
+        4 if number == RK4 else 1,
+        shift,
+        number >= TOOLBOX_EULER,
+        number in (LEAPFROG, ADAPTIVE_LEAPFROG),
+        number == ADAPTIVE_LEAPFROG,
     )
 
 
@@ -148,8 +157,8 @@ def load_law(laws, at):
 def spring_force(gap, law, before, scheme):
     """Four springs from the gaps (x, y, u, v) between their ends (m, m/s).
 
-    Returns their lengths and the forces (f_x, f_y) on their tails. The toolbox methods take
-    dl/dt as the change since the length `before`, others from the velocities.
+    Returns their lengths, the forces (f_x, f_y) on their tails, and their rates dl/dt: with the
+    toolbox methods the change since the length `before`, with others from the velocities.
     """
     x, y, u, v = gap
     l0, k1, k3, d1, d3 = law
@@ -161,7 +170,7 @@ def spring_force(gap, law, before, scheme):
         x2 = (length - before) * splat4(scheme.per_step)
     pull = x1 * (k1 + k3 * x1 * x1) + x2 * (d1 + d3 * x2 * x2)
     tension = pull * inverse
-    return length, x * tension, y * tension
+    return length, x * tension, y * tension, x2
 
 
 @njit(**COMPILE)

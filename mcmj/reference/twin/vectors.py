@@ -124,6 +124,19 @@ def square_root(typingctx, value):
     return value(value), generate
 
 
+@intrinsic
+def largest(typingctx, first, second):
+    """Element-wise maximum; a NaN gives way to a number."""
+
+    def generate(context, builder, sig, args):
+        vector = first.llvm()
+        kind = ir.FunctionType(vector, [vector, vector])
+        name = f"llvm.maxnum.v{first.width}f64"
+        return builder.call(cgutils.get_or_insert_function(builder.module, kind, name), args)
+
+    return first(first, second), generate
+
+
 @intrinsic(prefer_literal=True)
 def lane(typingctx, value, index):
     """Element `index` (a literal) of a vector."""

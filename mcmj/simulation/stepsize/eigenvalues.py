@@ -9,8 +9,9 @@ from scipy.linalg import eigh
 from scipy.sparse import csr_array, diags_array
 from scipy.sparse.linalg import ArpackError, eigsh
 
+from mcmj.reference.twin.adaptive import TOO_FAST
 from mcmj.simulation.stepsize.linearisation import Linearised
-from mcmj.simulation.stepsize.schemes import pencil, rk4_radius, scheme_of, step_map
+from mcmj.simulation.stepsize.schemes import parts_of, pencil, rk4_radius, scheme_of, step_map
 from mcmj.utils.validation import Array
 
 DENSE = 100  # coordinates up to which dense symmetric eigenvalues are faster than Lanczos
@@ -40,11 +41,18 @@ def stable_at(system: Linearised, integrator: str, step: float) -> bool:
         return True
     if scheme == "RK4":
         return step <= _rk4_bound(system) or step <= _rk4_limit(system)
+    if scheme == "adaptive_leapfrog":
+        step /= parts_of(system, step)
     return _top(system, *pencil(system, scheme), step)[0] < 4.0
 
 
 def _bears_all(system: Linearised, scheme: str) -> bool:
-    """Whether S and C are negative at a glance: 'discrete' without tension or secants."""
+    """Whether S and C are negative at a glance: 'discrete' without tension or secants.
+
+    Or whether no step is taken in parts that are too long for the springs.
+    """
+    if scheme == "adaptive_leapfrog":
+        return _top(system, *pencil(system, scheme), TOO_FAST / system.damper_rate)[0] < 4.0
     return (
         scheme == "discrete"
         and system.material is system.tangent_material

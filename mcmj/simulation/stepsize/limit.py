@@ -117,7 +117,7 @@ def warn_if_unstable(body: Body, options: Options) -> None:
     step, integrator, springs = options.physics_step, options.integrator, options.springs
     if isinstance(springs, CoupledLaw):
         return  # no slopes to go by
-    if _surely_stable(body, step, integrator_named(integrator), springs):
+    if _surely_stable(body, step, BY_NAME[integrator], springs):
         return
     system = linear_system(body, springs=springs)
     if stable_at(system, integrator, step):

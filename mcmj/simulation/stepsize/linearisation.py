@@ -24,7 +24,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.sparse import csr_array, diags_array
 
-from mcmj.core.body import Body
+from mcmj.core.body import Body, damper_reach
 from mcmj.core.callbacks.coupled_laws import CoupledLaw
 from mcmj.core.callbacks.spring_laws import SpringLaw, cubic, spring_law
 from mcmj.core.readout import Readout
@@ -46,6 +46,7 @@ class Linearised:
             integrator solves for.
         known: whether it knows them: native springs, not a callback's.
         dimensions: coordinates of a node, 2 or 3.
+        damper_rate: bound on the eigenvalues of M^-1 D with tangents [1/s], see `damper_reach`.
     """
 
     masses: Array
@@ -57,6 +58,7 @@ class Linearised:
     tangent_damping: csr_array
     known: bool = True
     dimensions: int = 2
+    damper_rate: float = 0.0
 
     @property
     def stiffness(self) -> csr_array:
@@ -146,6 +148,7 @@ def linear_system(
         tangent_damping=tangent_damping,
         known=spring_law(springs) is None,
         dimensions=body.dimensions,
+        damper_rate=float((damper_reach(body) * q_tangent).max()),
     )
 
 

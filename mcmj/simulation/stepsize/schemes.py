@@ -8,6 +8,7 @@ leapfrog takes the mean of f and the one before):
     implicitfast  the same with B = the diagonal of D
     discrete      (M + h D + h^2 K) (v+ - v) = the same - h^2 K v              q+ = q + h v+
     leapfrog      M (w+ - w) = h (f - (K + G) q - D (3 w - w-) / 2)            q+ = q + h w+
+    adaptive_leapfrog: the same, or in n = ceil(2 h r) > 1 parts, r = damper_rate
     RK4           x+ = (1 + z + z^2/2 + z^3/6 + z^4/24) x, z = h A, A the system's matrix
 
 Found by measurement on MuJoCo 3.17 (tests/test_steplimit.py repeats it): its implicit
@@ -20,17 +21,22 @@ q_k = (-1)^k u, whose equation is a symmetric pencil (Rayleigh quotients give th
 conditions of a quadratic or cubic; -1 is the first root out):
 
     stable  <=>  lambda_max(M^-1 (h^2 S + h C)) < 4        S, C: `pencil`
+
+with h / n for h where a step is taken in parts.
 """
+
+import math
 
 import numpy as np
 import numpy.typing as npt
 from scipy.sparse import csr_array, diags_array, kron
 
-from mcmj.core.integrators import INTEGRATORS, TWINS
+from mcmj.core.integrators import INTEGRATORS, TWINNED, TWINS
+from mcmj.reference.twin.adaptive import TOO_FAST
 from mcmj.simulation.stepsize.linearisation import Linearised
 from mcmj.utils.validation import Array
 
-BY_NAME = {**TWINS, **INTEGRATORS}  # a compiled twin takes the same step as MuJoCo
+BY_NAME = {**TWINS, **TWINNED, **INTEGRATORS}  # a compiled twin takes the same step as MuJoCo
 
 
 def scheme_of(integrator: str, *, known: bool) -> str:
@@ -44,7 +50,7 @@ def pencil(system: Linearised, scheme: str) -> tuple[csr_array, csr_array]:
     stiffness, damping = system.material + system.geometric, system.damping
     if scheme == "discrete":
         stiffness = stiffness - 2 * system.tangent_material
-    factor = INTEGRATORS[scheme].damping_factor
+    factor = BY_NAME[scheme].damping_factor
     return stiffness, factor * damping - 4 * known_damping(system, scheme)
 
 
@@ -64,6 +70,12 @@ def known_damping(system: Linearised, scheme: str) -> csr_array:
 
 def step_map(system: Linearised, scheme: str, step: float) -> Array:
     """Matrix that advances (q, v) (2 n,), or (q, w, w-) (3 n,), by a step [s] in closed loop."""
+    if scheme == "adaptive_leapfrog":
+        if (parts := parts_of(system, step)) > 1:
+            free, held = _in_parts(system, step, parts)
+            free[:, : len(system.masses)] -= held @ system.feedback.toarray()
+            return free
+        scheme = "leapfrog"
     advance, held = _free_and_held(system, scheme, step)
     n = len(system.masses)
     fed_back = held @ system.feedback.toarray()
@@ -97,6 +109,33 @@ def _free_and_held(system: Linearised, scheme: str, h: float) -> tuple[Array, Ar
     at = np.eye(n, change.shape[1])
     held = np.vstack([h * kick, kick, np.zeros((len(before), n))])
     return np.vstack([at + h * change, change, before]), held
+
+
+def parts_of(system: Linearised, step: float) -> int:
+    """Number of parts in which the adaptive leapfrog takes a step [s] of small motions."""
+    return max(1, math.ceil(step * system.damper_rate / TOO_FAST))
+
+
+def _in_parts(system: Linearised, step: float, parts: int) -> tuple[Array, Array]:
+    """x+ = free x + held f for x = (q, w, w-), as `reference.twin.adaptive` says.
+
+    Within the step the state is (q, V, w, f).
+    """
+    n, h = len(system.masses), step / parts
+    zero, one, inverse = np.zeros((n, n)), np.eye(n), np.diag(1.0 / system.masses)
+    stiffness = (system.material + system.geometric).toarray()
+    rate = np.hstack([-inverse @ stiffness, -inverse @ system.damping.toarray(), zero, inverse])
+    q, _, w, f = np.vsplit(np.eye(4 * n), 4)
+
+    def part(before: float) -> Array:
+        kicked = w + 0.5 * (before + h) * rate
+        return np.vstack([q + h * kicked, kicked + 0.5 * h * rate, kicked, f])
+
+    seen = np.hstack([zero, 1.5 * one, -0.5 * one, zero])  # V of (q, w, w-, f)
+    done = np.linalg.matrix_power(part(h), parts - 1) @ part(0.0) @ np.vstack([q, seen, seen, f])
+    v, kick = (w + 0.5 * h * rate) @ done, 0.5 * step * rate @ done
+    after = np.vstack([q @ done, v - kick, v - 3.0 * kick])
+    return after[:, : 3 * n], after[:, 3 * n :]
 
 
 def _rk4(z: Array, push: Array) -> tuple[Array, Array]:
