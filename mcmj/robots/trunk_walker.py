@@ -24,13 +24,14 @@ from mcmj.robots.ground import SQUARES, paint_squares
 from mcmj.robots.quadruped import GRAVITY
 from mcmj.robots.recorded_walk import record_walk
 from mcmj.robots.trunk import Trunk
-from mcmj.robots.walk_metrics import Walk, fallen
+from mcmj.robots.walk_metrics import Walk, fallen, headings
 from mcmj.simulation.reservoir import Reservoir
 from mcmj.targets.gaits import LEGS
 from mcmj.utils.errors import InvalidArgumentError
 from mcmj.utils.validation import Array
 
 STEPS = {2: ("discrete", 1e-3), 3: ("Euler", 4e-4)}  # by dimensions: integrator, time step [s]
+STEP_LENGTH, N_STEPS = 0.5, 60  # m
 STAND = 2.0  # s until a robot that is let go stands still
 SAMPLE = 0.01  # s, of a walk
 
@@ -42,6 +43,7 @@ def new_robot(
     integrator: str | None = None,
     ground: bool = True,
     slope: float = 0.0,
+    step: float = 0.0,
 ) -> Reservoir:
     """A robot as a reservoir.
 
@@ -50,6 +52,7 @@ def new_robot(
         integrator: one of MuJoCo's.
         ground: without it the robot falls freely.
         slope: of the ground, upwards ahead [rad].
+        step: height of bars across the way, one in every other STEP_LENGTH [m]; in space.
 
     Raises:
         InvalidArgumentError, UnknownNameError: an argument out of bounds.
@@ -60,12 +63,25 @@ def new_robot(
         raise InvalidArgumentError("integrator", "one of MuJoCo's", integrator)
     spec = trunk_spec(trunk, timestep or usual[1], integrator, ground=ground)
     spec.option.gravity = spec.option.gravity * np.cos(slope) - [GRAVITY * np.sin(slope), 0.0, 0.0]
+    if step:
+        _add_steps(spec, trunk, step)
     return Reservoir(
         spec,
         sensors=[f"length{i}" for i in range(trunk.n_sensed)],
         channels="m*",
         inputs="in*" if trunk.body.n_inputs else (),
     )
+
+
+def _add_steps(spec: mujoco.MjSpec, trunk: Trunk, height: float) -> None:
+    """Bars that begin in front of the robot, and turn with nothing."""
+    first, below = trunk.settings.width + STEP_LENGTH, -trunk.settings.foot
+    for i in range(N_STEPS):
+        spec.worldbody.add_geom(
+            name=f"step{i}", type=mujoco.mjtGeom.mjGEOM_BOX, contype=0, conaffinity=1,
+            size=[STEP_LENGTH / 2, 50.0, height], rgba=[0.75, 0.73, 0.7, 1.0],
+            pos=[first + 2 * i * STEP_LENGTH, 0.0, below],
+        )  # fmt: skip
 
 
 def trunk_spec(
@@ -155,6 +171,17 @@ def walk(
         joints=True, told=told,
         impulses={f"n{i}": share for i in range(n)} if push else None,
     )  # fmt: skip
+
+
+def heading_ahead(trunk: Trunk, robot: Reservoir) -> tuple[Array, Array]:
+    """qpos and qvel of a robot in space, carried back to the start and turned along x."""
+    pose = poses(trunk, robot.qpos)
+    turn = Rotation.from_euler("z", -float(headings(pose[None])[0])).as_matrix()
+    drawn = trunk.body.positions
+    middle = pose[:3] * [1.0, 1.0, 0.0]
+    start = drawn[: trunk.settings.nodes].mean(axis=0) * [1.0, 1.0, 0.0]
+    nodes = (drawn + robot.qpos.reshape(drawn.shape) - middle) @ turn.T + start
+    return (nodes - drawn).ravel(), (robot.qvel.reshape(drawn.shape) @ turn.T).ravel()
 
 
 def has_fallen(trunk: Trunk) -> Callable[[Trajectory], bool]:

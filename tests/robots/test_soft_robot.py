@@ -13,7 +13,7 @@ from mcmj.robots.energy import energy_balance
 from mcmj.robots.quadruped import GRAVITY
 from mcmj.robots.steering import LEVELS, PointFollower, steered_gait, straight_strides, strides
 from mcmj.robots.trunk import Trunk, draw_trunk, muscle_lengths, muscle_target
-from mcmj.robots.trunk_walker import new_robot, poses, stand, walk
+from mcmj.robots.trunk_walker import heading_ahead, new_robot, poses, stand, walk
 from mcmj.robots.walk_metrics import headings
 from mcmj.targets.gaits import LEGS
 
@@ -201,3 +201,27 @@ def test_an_operator_leads_a_point_that_turns_as_told_through_its_points():
             break
     assert operator.done
     assert nearest.max() < 0.3
+
+
+def test_carried_back_to_the_start_a_robot_goes_on_as_it_would(trunk):
+    """Nothing in the world but gravity and a level ground knows of places and directions."""
+    robot, angle = new_robot(trunk), 2.0
+    target = muscle_target(trunk, "trot", 16.0)
+    told = target.sample(robot.timestep * np.arange(2000))
+    robot.rollout(offset=told[:1000], gate=0.0, record=())
+    qpos, qvel = heading_ahead(trunk, robot)
+    turn = Rotation.from_euler("z", angle).as_matrix()
+    drawn = trunk.body.positions
+    robot.set_state(
+        ((drawn + qpos.reshape(-1, 3)) @ turn.T - drawn).ravel(),
+        (qvel.reshape(-1, 3) @ turn.T).ravel(),
+    )
+    back, rate = heading_ahead(trunk, robot)
+    assert np.abs(np.diff((back - qpos).reshape(-1, 3), axis=0)).max() < 1e-12
+    assert np.abs(rate - qvel).max() < 1e-12
+    ends = []
+    for start in ((qpos, qvel), (robot.qpos, robot.qvel)):
+        robot.set_state(*start)
+        robot.rollout(offset=told[1000:1100], gate=0.0, record=())
+        ends.append(poses(trunk, robot.qpos)[2])
+    assert ends[0] == pytest.approx(ends[1], abs=1e-9)

@@ -11,7 +11,9 @@ from mcmj.experiments.soft_robot.figure import figures
 from mcmj.experiments.soft_robot.result import Result
 from mcmj.experiments.soft_robot.run import run
 from mcmj.experiments.trunk.command import SHOWN, error_text
-from mcmj.robots.trunk_walker import walk
+from mcmj.experiments.trunk.result import LearnedGait
+from mcmj.robots.trunk_walker import heading_ahead, walk
+from mcmj.robots.walk_metrics import Walk
 from mcmj.utils import files
 
 
@@ -29,7 +31,7 @@ def film(result: Result, out: Path) -> None:
 
     gaits = {name: gait for name, gait in result.gaits.items() if gait.learned is not None}
     if gaits:
-        walks = {name: walk(gait.robot(), gait.trunk, SHOWN) for name, gait in gaits.items()}
+        walks = {name: _from_the_start(gait) for name, gait in gaits.items()}
         first = next(iter(gaits.values()))
         trunk_video(out / "soft_robot.mp4", first.robot().model, first.trunk, walks)
     for name, robot in result.steered.items():
@@ -38,6 +40,13 @@ def film(result: Result, out: Path) -> None:
             trunk_video(
                 out / "soft_robot_eight.mp4", robot.robot().model, robot.trunk, walks, speed=4.0
             )
+
+
+def _from_the_start(gait: LearnedGait) -> Walk:
+    """Seen from the side, wherever it has learned to walk."""
+    robot = gait.robot()
+    robot.set_state(*heading_ahead(gait.trunk, robot))
+    return walk(robot, gait.trunk, SHOWN)
 
 
 def show(result: Result, console: Console) -> None:

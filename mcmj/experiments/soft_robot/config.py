@@ -9,6 +9,7 @@ from mcmj.experiments.trunk import config as trunk
 from mcmj.learning.force_learning import ForceLearning
 from mcmj.robots.trunk import STEERS, TrunkSettings
 from mcmj.robots.trunk_walker import STEPS
+from mcmj.targets.gaits import GAITS
 from mcmj.utils.errors import InvalidArgumentError
 from mcmj.utils.validation import require_names, require_number
 
@@ -46,7 +47,7 @@ class Config(trunk.Config):
         impulses: sizes of the pushes [N s], for 0.1 s.
         survive: a push or switch is survived if the robot does not fall for so long [s].
         steps_ms: time steps of the part steps [ms].
-        slopes: of the ground, over 1.
+        slopes, heights: of the ground, over 1, and of steps up and down in it [m].
         cut: share of the springs that are cut.
         steered: gait of the robots that an input steers ..
         steering: .. how long they learn, and its values are held [s].
@@ -61,13 +62,14 @@ class Config(trunk.Config):
 
     parts: tuple[str, ...] = PARTS
     pace: float = 15.0
-    impulses: tuple[float, ...] = (20.0, 40.0, 60.0)
+    impulses: tuple[float, ...] = (20.0, 40.0, 80.0)
     survive: float = 6.0
     steps_ms: tuple[float, ...] = (0.2, 0.4)
     slopes: tuple[float, ...] = (-0.05, -0.02, 0.02, 0.05)
+    heights: tuple[float, ...] = (0.01, 0.02)
     cut: float = 0.1
-    steered: str = "trot"
-    steering: tuple[float, float] = (120.0, 3.0)
+    steered: str = "walk"
+    steering: tuple[float, float] = (90.0, 3.0)
     told: tuple[float, ...] = (-1.0, -0.8, -0.4, 0.0, 0.4, 0.8, 1.0)
     points: tuple[float, float] = (5.0, 0.5)
     gain: float = 2.0
@@ -80,12 +82,14 @@ class Config(trunk.Config):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        require_names("steered", (self.steered,), self.gaits)
+        require_names("steered", (self.steered,), GAITS)
         require_number("cut", self.cut, 0.0, 0.5, open_low=True)
         require_number("gain", self.gain, 0.0, open_low=True)
         for name in ("steering", "points"):
             for value in getattr(self, name):
                 require_number(name, value, 0.0, open_low=True)
+        for height in self.heights:
+            require_number("heights", height, 0.0, self.trunk.leg / 2)
         for slope in self.slopes:
             require_number("slopes", slope, -0.5, 0.5)
         for value in self.told:
@@ -112,7 +116,7 @@ def total_steps(config: Config) -> int:
         "steps": len(config.steps_ms) * walking,
         "energy": config.judged,
         "controls": 3 * config.survive + pushes * config.survive,
-        "ground": (len(config.slopes) + 1) * config.judged,
+        "ground": (len(config.slopes) + len(config.heights)) * config.judged,
         "cut": learning.total + 2 * walking,
         **dict.fromkeys(STEERS, steered / len(config.gaits)),
     }

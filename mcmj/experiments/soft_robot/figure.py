@@ -1,9 +1,10 @@
 """A soft robot: its body, its muscles' commands, its feet, and where it was steered."""
 
+from typing import Any
+
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from mpl_toolkits.mplot3d import Axes3D
 from mpl_toolkits.mplot3d.art3d import Line3DCollection
 
 from mcmj.experiments.soft_robot.result import Result
@@ -34,29 +35,31 @@ def robot_figure(result: Result) -> Figure:
 def draw_robot(figure: Figure, place: object, result: Result) -> Axes:
     """Trunk, muscles and feet in space, labelled for a legend."""
     trunk = next(iter(result.gaits.values())).trunk
-    axes = figure.add_subplot(place, projection="3d")
-    assert isinstance(axes, Axes3D)
+    axes: Any = figure.add_subplot(place, projection="3d")
     body, n = trunk.body, trunk.settings.nodes
     lines = body.positions[body.springs]
     for part, style in (
         (lines[: trunk.n_sensed], {"colors": "0.55", "lw": 0.8, "label": "springs, sensed"}),
         (lines[trunk.n_sensed :], {"colors": MUSCLE_COLOUR, "lw": 2.0, "label": "muscles, driven"}),
     ):
-        axes.add_collection3d(Line3DCollection(part, **style))
-    axes.scatter(*body.positions[:n].T, color="0.3", s=8, depthshade=False)
-    axes.scatter(*body.positions[n:].T, color="black", s=28, depthshade=False, label="feet")
+        axes.add_collection3d(Line3DCollection(part, clip_on=False, **style))
+    axes.scatter(*body.positions[:n].T, color="0.3", s=8, depthshade=False, clip_on=False)
+    axes.scatter(
+        *body.positions[n:].T, color="black", s=28, depthshade=False, clip_on=False, label="feet"
+    )
     _place(axes, trunk)
     axes.set_title(f"The robot: {n} nodes, {trunk.n_sensed} springs, {trunk.mass:g} kg")
-    return axes
+    found: Axes = axes
+    return found
 
 
-def _place(axes: Axes3D, trunk: Trunk) -> None:
+def _place(axes: Any, trunk: Trunk) -> None:
     low, high = trunk.body.positions.min(axis=0), trunk.body.positions.max(axis=0)
     axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]))
-    axes.set_box_aspect(high - low, zoom=1.3)
+    axes.set_box_aspect(high - low, zoom=1.25)
     axes.view_init(elev=18, azim=-62)
-    axes.set(xlabel="x [m], forwards", ylabel="y [m]", zlabel="height [m]")
-    axes.set_yticks([-0.2, 0.0, 0.2])
+    axes.set(xlabel="x [m], forwards", ylabel="y [m], left", zlabel="height [m]")
+    axes.set_yticks([-0.2, 0.2])
     axes.set_zticks([0.0, 0.4, 0.8])
 
 
@@ -90,7 +93,7 @@ def _draw_path(axes: Axes, path: Path) -> None:
     axes.plot(*path.points.T, "o", color=TARGET_COLOUR, ms=5, label="points")
     axes.plot(*middle[0], ">", color="black", ms=7, label="start")
     apart = np.linalg.norm(middle[:, None] - path.points, axis=-1).min(axis=0).max()
-    axes.set(aspect="equal", xlabel="x [m]", ylabel="y [m]")
+    axes.set(aspect="equal", xlabel="x [m]", ylabel="y [m], left")
     axes.set_title(f"a figure of eight: off by {apart:.2f} m at most", fontsize=10)
     axes.legend(frameon=False, fontsize=8)
     axes.spines[["right", "top"]].set_visible(False)

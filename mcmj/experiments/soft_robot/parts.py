@@ -8,9 +8,9 @@ import numpy as np
 
 from mcmj.experiments.blow_ups import or_lost
 from mcmj.experiments.soft_robot.config import Config
+from mcmj.experiments.soft_robot.controls import controls
 from mcmj.experiments.soft_robot.result import measures
 from mcmj.experiments.trunk import parts as trunk_parts
-from mcmj.experiments.trunk.parts import end_of
 from mcmj.experiments.trunk.result import LearnedGait, Table, fell
 from mcmj.experiments.trunk.run import learn_on
 from mcmj.learning.lessons import Lesson, Teaching
@@ -19,12 +19,11 @@ from mcmj.learning.teaching import Course
 from mcmj.learning.trial import trial_error
 from mcmj.metrics import orbits
 from mcmj.robots.energy import energy_balance
-from mcmj.robots.trunk_walker import has_fallen, new_robot, stand, walk
+from mcmj.robots.trunk_walker import has_fallen, heading_ahead, new_robot, stand, walk
 from mcmj.simulation.reservoir import Reservoir
 from mcmj.utils.errors import DivergenceError
 from mcmj.utils.progress import OnSteps
 from mcmj.utils.seeds import stream
-from mcmj.utils.validation import Array
 
 Gaits = dict[str, LearnedGait]
 
@@ -80,103 +79,18 @@ def energy(config: Config, gaits: Gaits, name: str, on_steps: OnSteps) -> Table:
     }
 
 
-def controls(config: Config, gaits: Gaits, name: str, on_steps: OnSteps) -> Table:
-    """Is it the lengths, now, that walk? The same readout on others'; and a tape of the outputs."""
-    gait = gaits[name]
-    rng = stream(config.seed, "walk_moments")
-    assert gait.learned is not None
-    weights = gait.learned.w_out
-    robot = gait.robot()
-    shuffled = np.vstack([rng.permutation(weights[:-1]), weights[-1:]])
-    shuffled[-1] += robot.signals @ (weights[:-1] - shuffled[:-1])  # the same outputs at first
-    frozen = np.vstack([0 * weights[:-1], robot.signals[None] @ weights[:-1] + weights[-1:]])
-    table: Table = {"rank": _rank(gait)}
-    for what, readout in (("shuffled", shuffled), ("frozen", frozen)):
-        robot = gait.robot()
-        robot.set_readout(readout)
-        table[what] = end_of(config, gait, robot, config.survive)
-        on_steps(round(config.survive / robot.timestep))
-    return table | {"tape": _tape(config, gait, on_steps)}
-
-
-def _rank(gait: LearnedGait) -> Table:
-    """Of the lengths while it walks: principal components of 99.9 % of their variance."""
-    run = gait.robot().rollout(round(8 * gait.target.period / gait.robot().timestep))
-    lengths = run.get("lengths")
-    spread = np.linalg.svd(lengths - lengths.mean(axis=0), compute_uv=False) ** 2
-    return {
-        "components": int(np.searchsorted(np.cumsum(spread), 0.999 * spread.sum()) + 1),
-        "participation": float(spread.sum() ** 2 / (spread**2).sum()),
-        "springs": lengths.shape[1],
-    }
-
-
-def _tape(config: Config, gait: LearnedGait, on_steps: OnSteps) -> Table:
-    """Pushes from the side of two likes: the loop closed, and open under what it said before.
-
-    How many survive, and how far the push has moved the rhythm of the feet for good, in periods:
-    a tape's cannot move.
-    """
-    robot = gait.robot()
-    steps = round((config.survive + 1.0) / robot.timestep)
-    start = robot.snapshot()
-    tape = robot.rollout(steps, record=("outputs", "qpos"))
-    forces = np.zeros((steps, robot.n_forces))
-    impulse = config.impulses[-1]
-    nodes = gait.trunk.settings.nodes
-    pushed = slice(0, round(0.1 / robot.timestep))
-    table: Table = {"impulse_N_s": impulse}
-    for what in ("closed", "tape"):
-        survived, moved = 0, []
-        for moment in range(config.pushes):
-            for way in (1.0, -1.0):
-                first = round(moment * gait.target.period / config.pushes / robot.timestep)
-                forces[:] = 0.0
-                share = way * impulse / 0.1 / nodes
-                forces[first:][pushed, 1 : 3 * nodes : 3] = share
-                robot.restore(start)
-                drive = {} if what == "closed" else {
-                    "offset": tape.get("outputs"), "gate": 0.0
-                }  # fmt: skip
-                run = or_lost(
-                    lambda drive=drive: robot.rollout(
-                        steps, forces=forces, record=("outputs", "qpos"), **drive
-                    ),
-                    None,
-                )
-                if run is None or has_fallen(gait.trunk)(run):
-                    continue
-                survived += 1
-                moved.append(_apart(run.get("qpos"), tape.get("qpos"), gait, robot.timestep))
-                on_steps(steps)
-        table[what] = {
-            "survived": survived,
-            "of": 2 * config.pushes,
-            "moved_periods": float(np.median(np.abs(moved))) if moved else None,
-        }
-    return table
-
-
-def _apart(one: Array, other: Array, gait: LearnedGait, step: float) -> float:
-    """Phase [periods] between two runs' feet heights, over their last strides."""
-    n = round(gait.target.period / step)
-    last = slice(-n * max(1, len(one) // (4 * n)), None)
-    heights = [run[last, 3 * gait.trunk.settings.nodes + 2 :: 3] for run in (one, other)]
-    turn = np.exp(-2j * np.pi * np.arange(len(heights[0])) / n)
-    first, second = ((turn[:, None] * (h - h.mean(axis=0))).sum(axis=0) for h in heights)
-    return float(np.angle((first * second.conj()).sum()) / (2 * np.pi))
-
-
 def ground(config: Config, gaits: Gaits, name: str, on_steps: OnSteps) -> Table:
-    """Slopes that nobody taught."""
-    gait, table = gaits[name], {}
-    for slope in config.slopes:
+    """Slopes, and steps up and down, that nobody taught."""
+    gait = gaits[name]
+    slopes = {f"slope {slope:g}": {"slope": float(np.arctan(slope))} for slope in config.slopes}
+    steps = {f"step {1e3 * step:g} mm": {"step": step} for step in config.heights}
+    start, table = heading_ahead(gait.trunk, gait.robot()), Table()
+    for what, kind in (slopes | steps).items():
         assert gait.learned is not None
-        robot = new_robot(gait.trunk, slope=float(np.arctan(slope)))
+        robot = new_robot(gait.trunk, **kind)
         robot.set_readout(gait.learned.w_out)
-        state = gait.robot()
-        robot.set_state(state.qpos, state.qvel)
-        table[f"{slope:g}"] = _short(config, gait, robot)
+        robot.set_state(*start)
+        table[what] = _short(config, gait, robot)
         on_steps(round(config.judged / robot.timestep))
     return table
 

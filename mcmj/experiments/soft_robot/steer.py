@@ -57,7 +57,7 @@ def learn_steered(config: Config, chosen: tuple[int, str], on_steps: OnSteps) ->
     duration, hold = config.steering
     steered = steered_gait(trunk, config.steered, config.pace, seed, duration=duration, hold=hold)
     robot = new_robot(trunk)
-    learning = replace(config.learning, round_duration=duration / config.learning.rounds)
+    learning = replace(config.learning, rounds=2, round_duration=duration / 2)
     try:
         learned = force_learn(
             robot, steered.target, learning, seed=seed, stand=lambda: stand(robot),
