@@ -54,6 +54,9 @@ TINY = {
     "--engine twin",
     "swing_up": f"{TAUGHT} --free-run 15 --window 12 --kicks 1 --rounds 0 --trial 13 "
     "--trial-window 12",
+    "soft_robot": (
+        "--gaits trot --parts energy --walking 3 --judged 1 --rounds 1 --round-duration 3 --trial 1"
+    ),
     "trunk": "--gaits trot --parts --walking 3 --judged 1 --rounds 1 --round-duration 4 --trial 2",
     "walk": "--parts walk --gaits trot --settle 2 --walking 3 --before 2 --after 2",
 }
