@@ -1,8 +1,8 @@
 #!/bin/sh
 # From a fresh clone to a running program in one command:
 #     sh scripts/run.sh limit_cycle [args...]
-# Needs only Python >= 3.11: it makes .venv, installs the package there, sees to off-screen
-# rendering, then becomes the program. Once that is done it costs about 0.1 s.
+# Needs only Python >= 3.11: it makes .venv, installs the package there and what COMMAND needs of
+# its extras, sees to off-screen rendering, then becomes the program. Later it costs about 0.1 s.
 #   PYTHON=/path/to/python   the interpreter to make .venv with
 #   MCMJ_NO_APT=1            never install system packages, even when root
 set -eu
@@ -11,8 +11,8 @@ unset PYTHONHOME PYTHONPATH  # ROS and the like would mix their own packages in
 root=$(CDPATH='' cd -- "$(dirname -- "$0")/.." && pwd -P)
 venv=$root/.venv
 vpy=$venv/bin/python
-# state/ours: .venv was made here ("version path"); state/stamp: it is complete, for what;
-# state/gl: egl, osmesa, or "none" and the GL libraries of that time.
+# state/ours: .venv was made here ("version path"); state/stamp: it is complete, for what, with
+# which extras; state/gl: egl, osmesa, or "none" and the GL libraries of that time.
 state=$venv/.mcmj
 gl_packages="libegl1 libegl-mesa0 libgl1-mesa-dri libopengl0"
 
@@ -41,7 +41,27 @@ print(getattr(sys, "_base_executable", None) or sys.executable)' 2>/dev/null && 
 
 venv_version() { "$vpy" -ISc 'import sys; print("%d.%d" % sys.version_info[:2])' 2>/dev/null; }
 wanted_stamp() { echo "$ver $root $(cksum <"$root/pyproject.toml")"; }
-python_ready() { ver=$(venv_version) && [ "$(cat "$state/stamp" 2>&1)" = "$(wanted_stamp)" ]; }
+
+# The extra that a command needs, if any: an experiment says so in its folder.
+extra_of() {
+    case $1 in
+        test | pytest | ruff | mypy) echo dev ;;
+        *) sed -n 's/^EXTRA = "\([a-z]*\)".*/\1/p' "$root/mcmj/experiments/$1/__init__.py" ;;
+    esac 2>/dev/null || :
+}
+
+# Extras that are installed, as in theory,search; nothing if the stamp is of another form.
+installed_extras() {
+    found=$(sed -n 's/^.*:\([a-z,]*\)$/\1/p' "$state/stamp" 2>/dev/null) || :
+    echo "${found-}"
+}
+
+python_ready() {
+    ver=$(venv_version) || return 1
+    installed=$(installed_extras)
+    [ "$(cat "$state/stamp" 2>&1)" = "$(wanted_stamp):$installed" ] || return 1
+    case ",$installed,," in *,dev,* | *",$extra,"*) ;; *) return 1 ;; esac
+}
 
 reusable() {
     ver=$(venv_version) || return 1   # no .venv, or its interpreter vanished
@@ -68,14 +88,19 @@ get_pip() {
 }
 
 set_up_python() {
+    extras=$(installed_extras)  # these stay
+    case ",$extras,," in *",$extra,"*) ;; *) extras=${extras:+$extras,}$extra ;; esac
     reusable || make_venv
     [ "${ver#3.}" -ge 11 ] || die "$venv has Python $ver, not >= 3.11: remove it and run this again"
     { mkdir -p "$state" && rm -f "$state/stamp"; } || die "cannot write $venv"
     get_pip || die "could not get pip: sudo apt-get install python$ver-venv, then run this again"
-    say "installing the package and what it needs into .venv (a minute or more) ..."
-    stamp=$(wanted_stamp)  # of before, should pyproject.toml change meanwhile
-    (cd "$root" && PIP_USER=0 "$vpy" -m pip --disable-pip-version-check --no-input \
-        install -qq -e ".[dev]") || die "the installation failed (see above); run this again to retry"
+    say "installing the package${extras:+ with $extras} into .venv (a minute or more) ..."
+    stamp=$(wanted_stamp):$extras  # of before, should pyproject.toml change meanwhile
+    # Python compiles modules when they are first used: most never are. MuJoCo is the one that all
+    # extras take, so that results do not change when one of them is added.
+    (cd "$root" && PIP_USER=0 "$vpy" -I scripts/show_pip.py --no-compile \
+        -e ".${extras:+[$extras]}" "mujoco<4") ||
+        die "the installation failed (see above); run this again to retry"
     # Last, and by renaming: a stamp means that all of the above went well.
     { echo "$stamp" >"$state/new" && mv "$state/new" "$state/stamp"; } || die "cannot write $venv"
 }
@@ -117,6 +142,7 @@ with mujoco.Renderer(model, 64, 64) as renderer:
 
 # Rendering is an extra: nothing here may make the command fail.
 set_up_gl() {
+    say "trying off-screen rendering ..."
     # shellcheck disable=SC2086  # several packages
     probe_gl || { apt_install $gl_packages && probe_gl; } ||
         { apt_install libosmesa6 && probe_gl; } || {
@@ -143,6 +169,7 @@ except OSError:
 }
 
 case ${1:-} in '' | -h | --help | help) usage; exit ;; esac
+extra=$(extra_of "$1")
 { python_ready && gl_ready; } || set_up </dev/null >&2 9<"$0"
 
 # The program gets the rendering that was seen to work, unless the user chose one.

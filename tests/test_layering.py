@@ -44,6 +44,7 @@ BELOW = {
 ABOVE = {
     "analysis.stability",
     "learning.environments",
+    "pictures.web_page",
     "pictures.window",
     "simulation.trajectory_files",
 }

@@ -59,7 +59,8 @@ def test_all_of_mcmj_is_in_the_wheel_and_nothing_else(wheel):
     names = set(zipfile.ZipFile(wheel).namelist())
     info = f"{wheel.name.split('-py3')[0]}.dist-info"
     assert {name.split("/")[0] for name in names} == {"mcmj", info}
-    modules = {str(path.relative_to(ROOT)) for path in (ROOT / "mcmj").rglob("*.py")}
+    kinds = ("*.py", "web_page/*.html", "web_page/*.css", "web_page/*.js")
+    modules = {str(p.relative_to(ROOT)) for kind in kinds for p in (ROOT / "mcmj").rglob(kind)}
     bodies = {f"mcmj/{path.relative_to(ROOT)}" for path in (ROOT / "bodies").rglob("*.xml")}
     assert {name for name in names if name.startswith("mcmj/")} == {
         "mcmj/py.typed", *modules, *bodies

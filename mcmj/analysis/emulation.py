@@ -15,14 +15,17 @@ from collections.abc import Callable, Sequence
 
 import numba
 import numpy as np
-import sympy as sp
 
 from mcmj.analysis.spring_arrays import parallel_body
 from mcmj.core.body import Body
 from mcmj.core.callbacks.coupled_laws import CoupledLaw
 from mcmj.core.callbacks.spring_laws import SpringLaw
 from mcmj.utils.errors import InvalidArgumentError
+from mcmj.utils.extras import extra
 from mcmj.utils.validation import Array, require_count, require_number
+
+with extra("theory", "emulation needs SymPy"):
+    import sympy as sp
 
 Acceleration = Callable[[float, float], float]
 Accelerations = Callable[[Array, Array, Array], None]

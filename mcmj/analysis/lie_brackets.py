@@ -17,11 +17,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import combinations
 
-import sympy as sp
-from sympy.polys.matrices import DomainMatrix
-
 from mcmj.utils.errors import InvalidArgumentError
+from mcmj.utils.extras import extra
 from mcmj.utils.validation import require_count
+
+with extra("theory", "Lie brackets need SymPy"):
+    import sympy as sp
+    from sympy.polys.matrices import DomainMatrix
 
 Point = dict[sp.Symbol, sp.Expr]
 

@@ -54,7 +54,7 @@ _ROWS = (
 INTEGRATORS = {row.name: row for row in _ROWS if row.mujoco_name}
 TWINS = {row.twin: row for row in _ROWS if row.twin}
 TWINNED = {row.name: row for row in TWINS.values()}
-DEFAULT_INTEGRATOR = "Euler"
+DEFAULT_INTEGRATOR = "leapfrog"
 
 
 def integrator_named(

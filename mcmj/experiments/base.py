@@ -98,14 +98,14 @@ def write_body(result: Any, source: Mapping[str, object], folder: Path) -> None:
     """body.xml: a result's body with all its readouts, the first of them active.
 
     Args:
-        result: with config, body and readouts by name.
+        result: with config, body, readouts by name and stepping, arguments of the Simulation.
         source: where the body comes from.
     """
     config, readouts = result.config, result.readouts
     xml = to_mjcf(
         result.body,
         timestep=config.timestep,
-        integrator=getattr(config, "integrator", DEFAULT_INTEGRATOR),
+        integrator=result.stepping.get("integrator", DEFAULT_INTEGRATOR),
         w_out=next(iter(readouts.values()), None),
         readouts=readouts,
         provenance={"body": source, "config": files.plain(config)},

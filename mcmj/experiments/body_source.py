@@ -1,11 +1,17 @@
 """Which bodies a config asks for: a file's, one that comes with mcmj, or random ones."""
 
 from dataclasses import asdict, dataclass
+from typing import Any
 
 from mcmj.core.random_body import BodySettings, draw_body
+from mcmj.learning.lessons import Teaching
+from mcmj.learning.teaching import teach
 from mcmj.mjcf.bundled import StoredBody, open_body
+from mcmj.simulation.simulation import Simulation
+from mcmj.targets.limit_cycles import TARGETS, target
+from mcmj.targets.named import require_outputs
 from mcmj.utils.errors import InvalidArgumentError
-from mcmj.utils.validation import require_count, require_seed
+from mcmj.utils.validation import Array, require_count, require_seed
 
 
 @dataclass(frozen=True)
@@ -68,3 +74,25 @@ class BodySource:
             return open_body(name)
         source = {"seed": seed, "settings": asdict(self.settings)}
         return StoredBody(draw_body(seed, self.settings), None, {}, source, {})
+
+
+def readouts_of(stored: StoredBody, seed: int, **stepping: Any) -> dict[str, Array]:
+    """The file's readouts by name; those of the paper's three targets, taught, if it has none.
+
+    Args:
+        seed: of teaching.
+        stepping: arguments of the Simulation that is taught.
+
+    Raises:
+        InvalidArgumentError: there is none, and the body has not the outputs for teaching.
+    """
+    if stored.readouts:
+        return stored.readouts
+    if stored.w_out is not None:
+        return {"readout": stored.w_out}
+    taught = {}
+    for name in TARGETS:
+        require_outputs(stored.body, target(name))
+        simulation = Simulation(stored.body, **stepping)
+        taught[name] = teach(simulation, target(name), Teaching(), seed).w_out
+    return taught

@@ -7,7 +7,7 @@ from typing import Any
 
 from mcmj.core.body import Body
 from mcmj.core.callbacks.spring_laws import NATIVE, SPRING_LAWS
-from mcmj.core.integrators import DEFAULT_INTEGRATOR
+from mcmj.core.integrators import DEFAULT_INTEGRATOR, TWINNED
 from mcmj.mjcf.read import (
     body_of_model,
     load_model,
@@ -81,12 +81,17 @@ class StoredBody:
     settings: dict[str, Any]
 
     def take(self, *names: str, **given: object) -> dict[str, Any]:
-        """Arguments of a Simulation: those named as in the file, if it says, and those given.
+        """Arguments of a Simulation: those given, and the integrator and those named of the file.
 
-        Warns of what the file holds and the run does not take; a spring law of the file's that
-        mcmj does not know is one.
+        None is not given. The twin takes the file's integrator if it has it. Warns of what the
+        file holds and the run does not take; a spring law of the file's that mcmj does not know
+        is one.
         """
-        run = {name: self.settings[name] for name in names if name in self.settings} | given
+        names = ("integrator", *names)
+        taken = {name: self.settings[name] for name in names if name in self.settings}
+        if given.get("engine") == "twin" and taken.get("integrator") not in TWINNED:
+            taken.pop("integrator", None)
+        run = taken | {name: value for name, value in given.items() if value is not None}
         if run.get("springs", NATIVE) not in (NATIVE, *SPRING_LAWS):
             run["springs"] = NATIVE
         defaults = {"timestep": 1e-3, "integrator": DEFAULT_INTEGRATOR, "springs": NATIVE,
@@ -95,9 +100,9 @@ class StoredBody:
         other = [name for name, value in self.settings.items() if whole[name] != value]
         if other:
             said = ", ".join(f"{name} {self.settings[name]}" for name in other)
-            taken = ", ".join(f"{name} {whole[name]}" for name in other)
+            takes = ", ".join(f"{name} {whole[name]}" for name in other)
             warnings.warn(
-                f"the body file was written for {said}; this run takes {taken}",
+                f"the body file was written for {said}; this run takes {takes}",
                 OtherPhysicsWarning,
                 stacklevel=3,
             )

@@ -47,8 +47,8 @@ def to_mjcf(
     Args:
         body: the body.
         timestep: physics step [s].
-        integrator: a name of mcmj.core.integrators; without mcmj's callbacks it is the row's
-            `mujoco_name`.
+        integrator: a name of mcmj.core.integrators. Without mcmj's callbacks, as in MuJoCo's stock
+            viewer, the file runs under the row's `mujoco_name`: leapfrog is then Euler.
         w_out: readout (L, n_outputs), or (L + 1, n_outputs) with a bias in the last row. With
             one the loop is closed wherever mcmj's callbacks are installed; else it is open.
         readouts: more readouts by name, kept in the file; see `readouts_of_model`.

@@ -19,6 +19,7 @@ from mcmj.learning.regression import Regression
 from mcmj.learning.teaching import synchronise
 from mcmj.robots.quadruped import Stride
 from mcmj.robots.rescale import SIZE, rescaled_readout
+from mcmj.robots.walk_scene import INTEGRATOR
 from mcmj.simulation.simulation import Simulation
 from mcmj.targets.limit_cycles import Target
 from mcmj.utils.validation import Array, require_number
@@ -77,7 +78,7 @@ def teach_lift(
         DivergenceError: the body blew up.
     """
     require_number("duration", duration, target.period)
-    simulation = Simulation(body, engine=engine)
+    simulation = Simulation(body, integrator=INTEGRATOR, engine=engine)
     synchronise(simulation, target, SYNCHRONISE)
     simulation.set_readout(checked_readout(body, w_out))
     simulation.rollout(round(SETTLE / simulation.timestep), record=())

@@ -28,6 +28,7 @@ from mcmj.utils.validation import require_number
 
 ROBOT = "robot/"  # what the names of its parts begin with
 TRUNK = ROBOT + "trunk"
+INTEGRATOR = "Euler"  # of a robot: what it touches needs MuJoCo's own
 GROUND_GROUP = 2  # of geoms, for renderers that leave the ground out
 
 
@@ -59,7 +60,7 @@ def walking_model(body: Body, robot: Quadruped, terrain: Terrain, bearing: float
     """
     if body.n_outputs != len(LEGS):
         raise InvalidArgumentError("body", f"{len(LEGS)} feedback channels, one a leg", body)
-    spec = mujoco.MjSpec.from_string(to_mjcf(replace(body, w_in=body.w_fb)))
+    spec = mujoco.MjSpec.from_string(to_mjcf(replace(body, w_in=body.w_fb), integrator=INTEGRATOR))
     spec.option.gravity = [0.0, 0.0, -GRAVITY]
     # contacts of the feet need constraints; a state that blew up is kept for the error message
     spec.option.disableflags = mujoco.mjtDisableBit.mjDSBL_AUTORESET.value

@@ -12,13 +12,12 @@ import numpy as np
 import numpy.typing as npt
 
 from mcmj.core.body import Body, require_plane
-from mcmj.core.integrators import DEFAULT_INTEGRATOR
 from mcmj.robots.leg_readouts import LegReadout
 from mcmj.robots.quadruped import GRAVITY, Quadruped
 from mcmj.robots.recorded_walk import record_walk
 from mcmj.robots.rescale import SIZE, rescaled
 from mcmj.robots.walk_metrics import Walk
-from mcmj.robots.walk_scene import ROBOT, TRUNK, Terrain, walking_model
+from mcmj.robots.walk_scene import INTEGRATOR, ROBOT, TRUNK, Terrain, walking_model
 from mcmj.simulation.reservoir import Reservoir
 from mcmj.targets.gaits import LEGS
 from mcmj.utils.validation import Array, as_array, require_number
@@ -50,7 +49,7 @@ class Walker(Reservoir):
         pace: float = 8.0,
         coupling: float = 0.0,
         timestep: float | None = None,
-        integrator: str = DEFAULT_INTEGRATOR,
+        integrator: str = INTEGRATOR,
         copies: int | None = None,
     ) -> None:
         require_plane(body, "a walker")

@@ -176,12 +176,14 @@ def trained_body(trial: Trial, account: Mapping[str, object]) -> str | None:
         body = draw_body(trial.seed, settings)
     if body is None:
         return None
+    integrator = getattr(config, "integrator", None)
+    integrator = getattr(result, "stepping", {}).get("integrator", integrator)
     provenance = {"experiment": trial.experiment, "config": plain(config), **account,
                   "versions": versions()}  # fmt: skip
     return to_mjcf(
         body,
         timestep=getattr(config, "timestep", 1e-3),
-        integrator=getattr(config, "integrator", DEFAULT_INTEGRATOR),
+        integrator=integrator or DEFAULT_INTEGRATOR,
         w_out=next(iter(readouts.values()), None),
         readouts=readouts,
         provenance=provenance,

@@ -103,6 +103,9 @@ class BatchEngine:
         """From now on, copies that blow up are no errors; `alive` says which."""
         self._lenient = True
 
+    def start_anew(self, data: mujoco.MjData) -> None:
+        """Before the velocities of a state are changed: let the integrator forget older ones."""
+
     def reset(self) -> None:
         """All copies back to the start, time 0."""
         self.batch.reset(stage=_NO_STAGE)

@@ -1,6 +1,7 @@
 """A body in MuJoCo: its model, and its nodes and springs in MuJoCo's numbers."""
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
@@ -73,6 +74,11 @@ class BodyEngine(BatchEngine):
             InvalidArgumentError: always.
         """
         raise InvalidArgumentError("forces", "(N,) or (T, N) on a body's nodes", "names")
+
+    def start_anew(self, data: Any) -> None:
+        """Before the velocities of a state are changed: the leapfrog begins again from it."""
+        data.qvel[:] = self._after_step(data.qvel, data.userdata)
+        data.userdata[self._memory] = 0.0
 
     # --- state -------------------------------------------------------------------------------
 

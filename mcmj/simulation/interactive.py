@@ -105,6 +105,7 @@ class LiveLoop:
     def kick(self, speed: float, draw: np.random.Generator) -> None:
         """Add random velocities of this standard deviation, MuJoCo's units, to all joints."""
         require_number("speed", speed, 0.0)
+        self._engine.start_anew(self.data)
         self.data.qvel[:] += speed * draw.standard_normal(self.data.qvel.shape)
 
     def switch(self, name: str) -> None:

@@ -42,7 +42,8 @@ class Reservoir(Loop):
         inputs: what inputs drive, the same way.
         w_out: readout (n_signals, n_channels), or with a bias as one row more.
         timestep: [s]; default: the model's.
-        integrator: Euler, RK4, implicit, implicitfast, discrete; default: the model's.
+        integrator: Euler, RK4, implicit, implicitfast, discrete; default: the model's; Euler for
+            a body's file of leapfrog.
         feedback_delay: steps between a signal and the force it feeds back; the first that many
             outputs fed back are 0.
         copies: independent copies, each with its own state and, if given, readout, inputs and

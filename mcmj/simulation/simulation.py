@@ -32,8 +32,8 @@ class Simulation(Reservoir):
         w_out: readout (L, n_outputs), or (L + 1, n_outputs) with a bias in the last row; a pair
             of weights and bias, or a Readout.
         timestep: control step [s]: inputs, feedback and records go at this pace.
-        integrator: one of MuJoCo's: Euler, RK4, implicit, implicitfast, discrete; or leapfrog,
-            of second order at Euler's cost (mcmj.core.callbacks.leapfrog).
+        integrator: leapfrog, of second order at Euler's cost (mcmj.core.callbacks.leapfrog); or
+            one of MuJoCo's: Euler, RK4, implicit, implicitfast, discrete.
         springs: "native" (MuJoCo's polynomial), "cubic" or "tansig" (compiled callback), or
             your own SpringLaw.
         feedback_delay: number of control steps between a length and the force it feeds back;

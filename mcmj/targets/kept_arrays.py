@@ -1,14 +1,12 @@
 """Arrays that take long to compute, kept in the user's cache folder from one process to the next.
 
 What is kept can always be computed again: a file that is damaged, or a folder that cannot be
-written, costs time and nothing else. The folder is MCMJ_CACHE_DIR, or else mcmj in the system's
-place for caches; of its files only the newest stay.
+written, costs time and nothing else. Of the files in the folder only the newest stay.
 """
 
 import hashlib
 import json
 import os
-import sys
 import zipfile
 from collections.abc import Callable, Mapping
 from contextlib import suppress
@@ -16,29 +14,11 @@ from pathlib import Path
 
 import numpy as np
 
-from mcmj.utils.files import plain
+from mcmj.utils.files import cache_folder, plain
 from mcmj.utils.validation import Array
 
 MOST_FILES = 64
 ACCOUNT = "account"  # in a file, beside the arrays
-
-
-def cache_folder() -> Path:
-    """Where arrays are kept; there may be no such folder yet.
-
-    Raises:
-        RuntimeError: the user has no home.
-    """
-    given = os.environ.get("MCMJ_CACHE_DIR")
-    if given:
-        return Path(given)
-    if sys.platform == "win32":
-        place = os.environ.get("LOCALAPPDATA") or str(Path.home() / "AppData" / "Local")
-    elif sys.platform == "darwin":
-        place = str(Path.home() / "Library" / "Caches")
-    else:
-        place = os.environ.get("XDG_CACHE_HOME") or str(Path.home() / ".cache")
-    return Path(place) / "mcmj"
 
 
 def kept_arrays(

@@ -1,11 +1,12 @@
-"""Where Numba keeps compiled code: beside the sources, or in the user's cache folder.
+"""Where Numba keeps the code that it compiles for mcmj: once a machine, in the user's cache folder.
 
-Where neither can be written, or a file there is cut off (a killed process, a full disk), Numba
-raises at import or in the middle of a run. Then a temporary folder takes their place.
+A folder's name is a digest of all sources of compiled code, the versions of Python and of Numba,
+and the processor. So checkouts with the same sources share it; after an edit or an update, code of
+before is not found. (Numba itself knows a function by its own file only, and does not look at what
+it calls in other files.)
 
-Numba knows a function's code by the date of its own file, and does not look at what it calls in
-other files: after an update it would run code of before. A stamp beside the cache names the
-sources that it was compiled from; of others, it is emptied.
+The place is NUMBA_CACHE_DIR if that is set, else `compiled` in mcmj's cache folder, else the
+package itself; where none can be written, a temporary folder.
 """
 
 import atexit
@@ -13,84 +14,123 @@ import functools
 import hashlib
 import os
 import pickletools
+import platform
 import shutil
 import tempfile
 import warnings
+from collections.abc import Callable, Iterator
+from contextlib import suppress
 from pathlib import Path
+from types import CodeType
+from typing import Any
 
+import llvmlite.binding
 import numba
+from numba.core.caching import CacheImpl, _CacheLocator
 
 from mcmj.utils.errors import McmjWarning
+from mcmj.utils.files import cache_folder
 
-_HERE = Path(__file__).parent
-_PACKAGE = _HERE.parent
-_COMPILED = ("core/callbacks", "reference/twin", "targets", "metrics")  # folders of compiled code
+_PACKAGE = Path(__file__).parent.parent
+# all that compiled code is made of
+_COMPILED = ("core/callbacks", "reference/twin", "targets", "metrics")
+_CONSTANTS = ("core/integrators.py", "utils/quiet.py")
+FUNCTIONS: set[CodeType] = set()  # those of mcmj that Numba knows by now
+KEPT = 8  # folders of other sources, processors or versions that stay, the last used
+
+
+class _Locator(_CacheLocator):
+    """The place of one function's compiled code, for Numba."""
+
+    mixed = False  # a file was edited before it was imported: what comes now may call new code
+
+    def __init__(self, function: Callable[..., object], file: Path, folder: Path) -> None:
+        self._py_file, self._lineno = str(file), function.__code__.co_firstlineno
+        self._name = str(file.relative_to(_PACKAGE))
+        self._folder = folder
+        _Locator.mixed |= _digest_of(file) != _sources()[file]
+        self._stamp = os.urandom(8).hex() if _Locator.mixed else "of the digest"
+
+    @classmethod
+    def from_function(cls, py_func: Callable[..., object], py_file: str) -> "_Locator | None":
+        file = Path(py_file)
+        if file not in _sources():
+            return None  # another package's
+        FUNCTIONS.add(py_func.__code__)
+        return cls(py_func, file, ensure_cache())
+
+    def get_cache_path(self) -> str:
+        return str(self._folder / self._name.removesuffix(".py").replace(os.sep, "."))
+
+    def get_source_stamp(self) -> str:
+        """Numba takes code of the same stamp only: where sources are mixed, of no other process."""
+        return self._stamp
+
+    def get_disambiguator(self) -> str:
+        return str(self._lineno)
 
 
 @functools.cache  # every package of compiled code asks, before it is imported
-def ensure_cache() -> None:
-    """Use a temporary folder, with a warning, if Numba's own cannot be used.
+def ensure_cache() -> Path:
+    """The folder for compiled code, made if need be; Numba uses it from now on.
 
-    The folder is removed when the process ends; those that it starts use it too.
+    A temporary one, with a warning, if no other can be written. It is removed when the process
+    ends; those that it starts use it too.
     """
-    trouble = _trouble()
-    if trouble is None:
+    locators: list[Any] = CacheImpl._locator_classes  # Numba has no types
+    locators.insert(0, _Locator)
+    name = _name()
+    for place in _places():
+        folder = place / name
+        if _is_usable(folder):
+            _forget_others(place)
+            return folder
+    return _temporary() / name
+
+
+def _places() -> Iterator[Path]:
+    given = numba.config.CACHE_DIR  # type: ignore[attr-defined]  # Numba makes it late
+    if given:
+        yield Path(given) / "mcmj"
         return
-    folder, owner = tempfile.mkdtemp(prefix="mcmj-numba-"), os.getpid()
-    os.environ["NUMBA_CACHE_DIR"] = folder  # for processes that this one starts
-    setattr(numba.config, "CACHE_DIR", folder)  # noqa: B010  (it declares none)
-
-    def remove() -> None:
-        if os.getpid() == owner:  # not in a forked child
-            shutil.rmtree(folder, ignore_errors=True)
-
-    atexit.register(remove)
-    message = f"{trouble}: compiled code goes to a temporary folder, and is made anew each time"
-    warnings.warn_explicit(message, McmjWarning, "mcmj", 0)  # one line: no source to show
+    with suppress(RuntimeError):  # a user without a home
+        yield cache_folder() / "compiled"
+    yield _PACKAGE / "__pycache__" / "compiled"
 
 
-def _trouble() -> str | None:
-    """What is wrong with Numba's cache, None if nothing is."""
-    if numba.config.DISABLE_JIT:  # type: ignore[attr-defined]  # Numba makes it late
-        return None
+def _name() -> str:
+    """A digest of all that compiled code depends on."""
+    binding = llvmlite.binding
+    account = [f"{file.relative_to(_PACKAGE)} {digest}" for file, digest in _sources().items()]
+    account += [platform.python_version(), numba.__version__, llvmlite.__version__]
+    account += [binding.get_host_cpu_name(), binding.get_host_cpu_features().flatten()]
+    return hashlib.blake2b("\n".join(account).encode(), digest_size=16).hexdigest()
+
+
+@functools.cache
+def _sources() -> dict[Path, str]:
+    """Digests of the files that compiled code is made of, as they were when first asked."""
+    files = [_PACKAGE / name for name in _CONSTANTS]
+    files += [file for name in _COMPILED for file in sorted((_PACKAGE / name).glob("*.py"))]
+    return {file: _digest_of(file) for file in files}
+
+
+def _digest_of(file: Path) -> str:
+    return hashlib.blake2b(file.read_bytes(), digest_size=16).hexdigest()
+
+
+def _is_usable(folder: Path) -> bool:
+    """Whether it can be written; cut-off files, of a killed process or a full disk, are removed."""
     try:
-        cache = numba.njit(cache=True)(_trouble).stats.cache_path or ""
-    except RuntimeError:  # "no locator available"
-        return "neither the package's folder nor the user's cache folder can be written"
-    if not _is_of_these_sources(Path(cache)):
-        return f"{cache} was compiled from other sources, and cannot be emptied"
-    for file in _cached_files(Path(cache)):
-        if not _is_whole(file):
-            return f"{file} is damaged (delete it)"
-    return None
-
-
-def _is_of_these_sources(cache: Path) -> bool:
-    """Whether the cache is of the sources as they are, emptied if need be."""
-    digest = hashlib.blake2b(digest_size=8)
-    for folder in _COMPILED:
-        for source in sorted((_PACKAGE / folder).glob("*.py")):
-            digest.update(source.name.encode() + source.read_bytes())
-    stamp = cache / f"mcmj-{digest.hexdigest()}"
-    if stamp.exists():
-        return True
-    try:
-        for file in [*_cached_files(cache), *cache.glob("mcmj-*")]:
-            file.unlink(missing_ok=True)
-        cache.mkdir(parents=True, exist_ok=True)
-        stamp.touch()
+        folder.mkdir(parents=True, exist_ok=True)
+        tempfile.TemporaryFile(dir=folder).close()
+        os.utime(folder)  # for `_forget_others`
+        for file in folder.glob("*/*.nb[ic]"):
+            if not _is_whole(file):
+                file.unlink(missing_ok=True)
     except OSError:
         return False
     return True
-
-
-def _cached_files(cache: Path) -> list[Path]:
-    """Numba's files of this package, given the folder of those of this module."""
-    if cache.parent == _HERE:
-        return list(_PACKAGE.rglob("__pycache__/*.nb[ic]"))
-    packages = {path.parent.name for path in _PACKAGE.rglob("*.py")}
-    folders = [f for f in cache.parent.iterdir() if f.name.rpartition("_")[0] in packages]
-    return [file for folder in folders for file in folder.glob("*.nb[ic]")]
 
 
 def _is_whole(path: Path) -> bool:
@@ -106,3 +146,28 @@ def _is_whole(path: Path) -> bool:
         return True
     except Exception:  # genops raises anything on what is no pickle
         return False
+
+
+def _forget_others(place: Path) -> None:
+    """Remove all folders but those last used."""
+    with suppress(OSError):
+        folders = sorted(place.iterdir(), key=lambda one: one.stat().st_mtime)
+        for old in folders[:-KEPT]:
+            shutil.rmtree(old, ignore_errors=True)
+
+
+def _temporary() -> Path:
+    folder, owner = tempfile.mkdtemp(prefix="mcmj-numba-"), os.getpid()
+    os.environ["NUMBA_CACHE_DIR"] = folder  # for processes that this one starts
+
+    def remove() -> None:
+        if os.getpid() == owner:  # not in a forked child
+            shutil.rmtree(folder, ignore_errors=True)
+
+    atexit.register(remove)
+    message = (
+        "neither the user's cache folder nor the package's can be written: compiled code goes to "
+        "a temporary folder, and is made anew each time"
+    )
+    warnings.warn_explicit(message, McmjWarning, "mcmj", 0)  # one line: no source to show
+    return Path(folder) / "mcmj"

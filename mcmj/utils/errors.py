@@ -65,6 +65,10 @@ class MissingExtraError(McmjError, ImportError):
         super().__init__(f"{purpose}: pip install 'mcmj[{extra}]' ({reason})")
 
 
+class PackageError(McmjError, OSError):
+    """MuJoCo's WebAssembly package is another one, or cannot be fetched: says how to get it."""
+
+
 class McmjWarning(UserWarning):
     """Base class of every warning that mcmj gives."""
 

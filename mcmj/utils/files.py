@@ -6,6 +6,7 @@ import json
 import os
 import platform
 import shutil
+import sys
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, nullcontext, suppress
 from contextvars import ContextVar
@@ -24,6 +25,24 @@ except ImportError:  # not a Unix
 
 _LOCKED: ContextVar[frozenset[Path]] = ContextVar("_LOCKED", default=frozenset())
 _PACKAGES = ("mcmj", "mujoco", "numpy", "scipy", "numba")
+
+
+def cache_folder() -> Path:
+    """MCMJ_CACHE_DIR, or else mcmj in the system's place for caches; it need not exist yet.
+
+    Raises:
+        RuntimeError: the user has no home.
+    """
+    given = os.environ.get("MCMJ_CACHE_DIR")
+    if given:
+        return Path(given)
+    if sys.platform == "win32":
+        place = os.environ.get("LOCALAPPDATA") or str(Path.home() / "AppData" / "Local")
+    elif sys.platform == "darwin":
+        place = str(Path.home() / "Library" / "Caches")
+    else:
+        place = os.environ.get("XDG_CACHE_HOME") or str(Path.home() / ".cache")
+    return Path(place) / "mcmj"
 
 
 def versions() -> dict[str, str]:

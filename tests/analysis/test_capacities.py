@@ -42,7 +42,7 @@ def pair():
     names = [actuator.name for actuator in spec.actuators]
     spec.actuator(names[1]).biastype = mujoco.mjtBias.mjBIAS_NONE  # its own law is taken out
     reservoir = mcmj.Reservoir(spec, sensors="*", channels=names[1:], inputs=names[:1])
-    return mcmj.Simulation(body), reservoir
+    return mcmj.Simulation(body, integrator="Euler"), reservoir
 
 
 def test_a_body_as_a_reservoir_is_worth_the_same(pair):

@@ -54,7 +54,7 @@ TINY = {
     "trunk": "--gaits trot --parts --walking 3 --judged 1 --rounds 1 --round-duration 4 --trial 2",
     "walk": "--parts walk --gaits trot --settle 2 --walking 3 --before 2 --after 2",
 }
-APART = {"reproduce", "view"}  # commands of commands, and a person; tested on their own
+APART = {"reproduce", "view", "web"}  # commands, a person, npm; tested on their own
 TIMED = {  # metrics that are times, by path; all others are the same in every run
     "benchmark": ("*",),
     "guided": ("*per_second",),

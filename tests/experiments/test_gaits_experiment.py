@@ -11,7 +11,7 @@ from mcmj.learning.lessons import Teaching
 from mcmj.learning.practice import Practice
 from mcmj.metrics import gaits as gaitmetrics
 from mcmj.metrics import orbits
-from mcmj.mjcf.bundled import body_names, body_path
+from mcmj.mjcf.bundled import StoredBody, body_names, body_path
 from mcmj.mjcf.read import load_model, readouts_of_model
 from mcmj.targets.gaits import GAITS, gait_target
 from mcmj.utils.errors import DivergenceError, InvalidArgumentError, UnknownNameError
@@ -129,17 +129,18 @@ def test_a_body_without_the_channels_and_a_wrong_readout_are_refused():
     body = mcmj.random_body(0, 12, n_outputs=4)
     wrong = {"trot": np.zeros((body.n_springs + 2, 4))}
     with pytest.raises(InvalidArgumentError, match=r"readout trot: expected \d+ rows"):
-        gaits.run_body(QUICK, body, wrong, 0)
+        gaits.run_body(QUICK, StoredBody(body, None, wrong, {}, {}), 0)
     with pytest.raises(UnknownNameError, match="unknown gait 'walk'; valid choices: bound, trot"):
-        gaits.run_body(QUICK, body, {"walk": wrong["trot"]}, 0)
+        gaits.run_body(QUICK, StoredBody(body, None, {"walk": wrong["trot"]}, {}, {}), 0)
     with pytest.raises(InvalidArgumentError, match="window: expected a number in"):
         gaits.run(Config(gaits=("trot",), window=6.0))
 
 
 def test_the_committed_body_has_its_four_readouts():
     assert "gaits" in body_names()
-    body, readouts, source = get_body(Config(), 0)
-    assert set(readouts) == set(GAITS)
+    stored = get_body(Config(), 0)
+    body, source = stored.body, stored.provenance
+    assert set(stored.readouts) == set(GAITS)
     assert (body.n_nodes, body.n_outputs) == (50, 4)
     drawn = mcmj.core.random_body.draw_body(
         source["body"]["seed"], BodySettings(**source["body"]["settings"])

@@ -27,7 +27,7 @@ def goal():
 
 def test_a_lesson_mixes_the_bodys_own_outputs_into_what_is_fed_back(body, w_out, goal):
     """The same regression from the twin, driven by s y + (1 - s) y* + noise, and NumPy."""
-    simulation = Simulation(body, timestep=STEP, w_out=w_out)
+    simulation = Simulation(body, timestep=STEP, w_out=w_out, integrator="Euler")
     course = Course(simulation, replace(TAUGHT, ridge_per_row=1e-6), seed=3)
     simulation.rollout(100, record=())
     before = simulation.state

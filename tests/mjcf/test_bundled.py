@@ -2,7 +2,7 @@
 
 import subprocess
 import sys
-from dataclasses import fields
+from dataclasses import fields, replace
 from pathlib import Path
 
 import numpy as np
@@ -16,7 +16,7 @@ from mcmj.experiments.render import run as render
 from mcmj.experiments.view import run as view
 from mcmj.learning.teaching import synchronise
 from mcmj.metrics.orbits import orbit_error
-from mcmj.mjcf.bundled import body_names, body_path
+from mcmj.mjcf.bundled import body_names, body_path, open_body
 from mcmj.mjcf.read import load_model, provenance_of_model, readouts_of_model
 from mcmj.utils.errors import OtherPhysicsWarning, UnknownNameError
 
@@ -73,7 +73,6 @@ def written(path, name="quadratic", **how):
 
 
 OTHERS = {
-    "integrator RK4": {"integrator": "RK4"},
     "timestep 0.0005": {"timestep": 5e-4},
     "springs tansig": {"springs": "tansig"},
     "feedback_delay 2": {"feedback_delay": 2e-3},
@@ -87,7 +86,27 @@ def test_what_a_run_does_not_take_from_a_file_is_a_warning(said, tmp_path):
     with pytest.warns(OtherPhysicsWarning, match=f"written for {said}; this run takes"):
         limit_cycle_config.get_body(config)
     with pytest.warns(OtherPhysicsWarning, match=said):
-        view._body_and_readouts(view.Config(body=path))
+        view._simulation_and_readouts(view.Config(body=path))
+
+
+@pytest.mark.parametrize("integrator", ["Euler", "RK4", "discrete"])
+def test_commands_keep_the_integrator_of_the_file(integrator, tmp_path):
+    path = written(tmp_path / "body.xml", integrator=integrator)
+    config = limit_cycle_config.Config(task="quadratic", body=path, free_run=40.0)
+    *_, stepping = limit_cycle_config.get_body(config)
+    assert stepping["integrator"] == integrator
+    shown, _ = view._simulation_and_readouts(view.Config(body=path))
+    assert shown.options.integrator == integrator
+    with pytest.warns(OtherPhysicsWarning, match=f"for integrator {integrator}; this run takes i"):
+        limit_cycle_config.get_body(replace(config, integrator="leapfrog"))
+
+
+def test_the_twin_takes_the_integrators_that_it_has(tmp_path):
+    stored = open_body(written(tmp_path / "body.xml", integrator="Euler"))
+    assert stored.take(engine="twin") == {"integrator": "Euler", "engine": "twin"}
+    stored = open_body(written(tmp_path / "body.xml", integrator="discrete"))
+    with pytest.warns(OtherPhysicsWarning, match="this run takes integrator leapfrog"):
+        assert stored.take(engine="twin") == {"engine": "twin"}
 
 
 def test_a_film_is_run_as_the_file_says(tmp_path):
@@ -99,7 +118,7 @@ def test_a_film_is_run_as_the_file_says(tmp_path):
     assert np.array_equal(film.positions, alone)
     with pytest.warns(OtherPhysicsWarning, match=r"timestep 0\.0005; this run takes timestep 0"):
         _body, _source, settings = perturb.get_body(perturb.Config(body=path), 0)
-    assert settings == how | {"timestep": 1e-3}
+    assert settings == how | {"timestep": 1e-3, "engine": "mujoco"}
 
 
 def test_a_command_shows_a_warning_in_one_line(tmp_path):

@@ -73,7 +73,7 @@ def test_colours_follow_the_paper(body):
 
 def test_steps_in_dm_control_as_in_mujoco(body):
     dm_mujoco = pytest.importorskip("dm_control.mujoco")
-    text = to_mjcf(body)
+    text = to_mjcf(body, integrator="Euler")
     physics = dm_mujoco.Physics.from_xml_string(text)
     model = mujoco.MjModel.from_xml_string(text)
     data = mujoco.MjData(model)

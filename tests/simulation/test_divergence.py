@@ -13,7 +13,7 @@ from mcmj.utils.errors import DivergenceError, McmjError
 
 @pytest.fixture
 def explosive():
-    """Stiff dampers under explicit Euler: blows up as soon as something moves."""
+    """Stiff dampers under an explicit integrator: blows up as soon as something moves."""
     return mcmj.random_body(1, nodes=6, d3=(1e5, 1e5))
 
 
@@ -33,7 +33,7 @@ def test_divergence_says_when_where_and_what_to_try(
     for text in (
         f"t = {error.time:.6g} s",
         "node ",
-        "Euler",
+        "leapfrog",
         "step 5 ms",
         "substeps=2",
         "discrete",

@@ -30,7 +30,7 @@ def test_every_copy_has_its_own_readout_and_drive(body, bias):
     readouts = 0.05 * rng.normal(size=(copies, body.n_springs + bias, 2))
     inputs, forces = rng.normal(size=(copies, steps, 2)), rng.normal(size=(copies, steps, 8))
     offset, velocities = rng.normal(size=(steps, 2)), 0.2 * rng.normal(size=(copies, 8, 2))
-    ensemble = Ensemble(body, copies=copies, threads=2, w_out=readouts)
+    ensemble = Ensemble(body, copies=copies, threads=2, w_out=readouts, integrator="Euler")
     ensemble.set_state(velocities=velocities)
     run = ensemble.rollout(inputs=inputs, forces=forces, offset=offset, record=ALL)
     assert run.lengths.shape == (copies, steps, body.n_springs)

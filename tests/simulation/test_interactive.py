@@ -74,11 +74,14 @@ def test_freezing_is_that_of_a_schedule(loop, body, w_out):
     assert np.abs(positions(loop) - simulation.state.positions).max() < 1e-12
 
 
-def test_forces_and_kicks_move_the_nodes(loop, body, w_out):
+def test_forces_and_kicks_move_the_nodes(body, w_out):
+    """Under Euler: a simulation's forces act half a step later under the leapfrog."""
+    loop = LiveLoop(mcmj.Simulation(body, integrator="Euler"), {"plain": w_out})
     horizontal = np.zeros((body.n_nodes, 2))
     horizontal[:, 0] = np.arange(body.n_nodes)
     loop.advance(200, pushes(loop, horizontal))
-    run = mcmj.Simulation(body, w_out=w_out).rollout(200, forces=horizontal[:, 0])
+    simulation = mcmj.Simulation(body, w_out=w_out, integrator="Euler")
+    run = simulation.rollout(200, forces=horizontal[:, 0])
     assert np.abs(positions(loop) - run.final_state.positions).max() < 1e-12
     loop.reset()
     loop.advance(
@@ -94,6 +97,22 @@ def test_forces_and_kicks_move_the_nodes(loop, body, w_out):
     loop.advance(1)
     assert 1e-3 < np.abs(positions(loop) - body.positions).max() < 1e-2
     assert loop.alive
+
+
+def test_a_kick_under_leapfrog_is_one_of_a_simulation(body, w_out):
+    """Velocities are those at half steps: what is added must not look like a change in time."""
+    simulation = mcmj.Simulation(body, w_out=w_out, integrator="leapfrog")
+    loop = LiveLoop(simulation, {"plain": w_out})
+    loop.advance(200)
+    loop.kick(0.5, np.random.default_rng(0))
+    loop.advance(100)
+    simulation.rollout(200)
+    kick = np.zeros(body.positions.shape)
+    draw = np.random.default_rng(0).standard_normal(loop.data.qvel.shape)
+    kick[body.free] = 0.5 * draw.reshape(-1, 2)
+    simulation.set_state(velocities=simulation.state.velocities + kick)
+    simulation.rollout(100)
+    assert np.abs(positions(loop) - simulation.state.positions).max() < 1e-12
 
 
 def test_any_model_is_its_rollout(tmp_path):

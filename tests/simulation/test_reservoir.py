@@ -10,6 +10,7 @@ from models import ARM, ARM_CHANNELS, T, driven
 
 import mcmj
 from mcmj import Reservoir
+from mcmj.core.callbacks import install
 from mcmj.metrics.orbits import orbit_error
 from mcmj.utils.errors import (
     BodyFileError,
@@ -122,7 +123,7 @@ def test_a_delay_feeds_back_what_was():
 
 
 def test_a_body_is_the_same_as_a_reservoir_and_as_a_simulation(body, w_bias):
-    simulation = mcmj.Simulation(body, w_out=w_bias)
+    simulation = mcmj.Simulation(body, w_out=w_bias, integrator="Euler")
     channels = [f"y{c}" for c in range(body.n_outputs)]
     xml = mcmj.to_mjcf(body)
     names = [a.name for a in mujoco.MjSpec.from_string(xml).actuators][body.n_inputs :]
@@ -135,6 +136,24 @@ def test_a_body_is_the_same_as_a_reservoir_and_as_a_simulation(body, w_bias):
     )  # fmt: skip
     one, other = simulation.rollout(2000), reservoir.rollout(2000)
     assert np.abs(one.lengths - other.signals).max() < 1e-13  # 0 here: lengths of some 10 m
+
+
+@pytest.mark.parametrize("read", [str, mujoco.MjModel.from_xml_string])
+@pytest.mark.parametrize("installed", [False, True])
+def test_a_file_of_leapfrog_is_euler_as_a_reservoir(body, w_out, installed, read):
+    install.uninstall()
+    install.install(passive=installed)
+    one, other = (
+        Reservoir(
+            read(mcmj.to_mjcf(body, integrator=integrator)),
+            sensors="length*", channels="fb*", inputs="in*", w_out=w_out,
+        )
+        for integrator in ("leapfrog", "Euler")
+    )  # fmt: skip
+    inputs = np.random.default_rng(0).normal(size=(100, 2))
+    signals = [run.rollout(inputs=inputs).signals for run in (one, other)]
+    assert np.ptp(signals[0], axis=0).max() > 1e-3
+    assert np.array_equal(*signals)
 
 
 @pytest.mark.parametrize(

@@ -52,13 +52,14 @@ def test_free_phases_are_one_rollout(body, w_out):
 @pytest.mark.parametrize("readout", ["w_out", "w_bias"])
 def test_a_frozen_output_is_constant_and_what_the_twin_does_with_it(body, readout, request):
     weights = request.getfixturevalue(readout)
-    result = run(body, weights, Phase(0.2), Phase(0.2, freeze=(0,)), Phase(0.1))
+    euler = {"integrator": "Euler"}
+    result = run(body, weights, Phase(0.2), Phase(0.2, freeze=(0,)), Phase(0.1), **euler)
     held = result.feedback[200:400]
     assert np.ptp(held[:, 0]) == 0.0
     assert np.ptp(held[:, 1]) > 1e-6
     first = result.feedback[199]
     assert held[0, 0] == first[0]  # no jump as the phase begins
-    before = moving(body, weights)
+    before = moving(body, weights, **euler)
     before.rollout(200)
     state = before.state
     offset = np.tile([first[0], 0.0], (200, 1))

@@ -38,11 +38,12 @@ def test_snapshot_and_restore(body, w_bias, drive, options):
 
 @pytest.mark.parametrize("engine", ["mujoco", "twin"])
 def test_a_snapshot_of_something_else_is_refused(body, engine):
-    simulation = Simulation(body, engine=engine)
+    options = {"engine": engine, "integrator": "Euler"}
+    simulation = Simulation(body, **options)
     heavier = {f.name: getattr(body, f.name) for f in fields(body)} | {"masses": 2 * body.masses}
     others = [
-        Simulation(Body(**heavier), engine=engine),
-        Simulation(body, engine=engine, timestep=2e-3),
+        Simulation(Body(**heavier), **options),
+        Simulation(body, **options, timestep=2e-3),
         Simulation(body, engine=engine, integrator="RK4"),
     ]
     for other in others:
@@ -52,9 +53,7 @@ def test_a_snapshot_of_something_else_is_refused(body, engine):
     for wrong in (None, "x", 3.0, [], [[]]):
         with pytest.raises(InvalidArgumentError, match=r"^snapshot: "):
             simulation.restore(wrong)
-    simulation.restore(
-        Simulation(Body(**heavier | {"masses": body.masses}), engine=engine).snapshot()
-    )
+    simulation.restore(Simulation(Body(**heavier | {"masses": body.masses}), **options).snapshot())
 
 
 @pytest.mark.parametrize("options", VARIANTS)
@@ -72,7 +71,7 @@ def test_set_state(body):
     rng = np.random.default_rng(0)
     positions = body.positions + rng.normal(size=body.positions.shape)
     velocities = 0.3 * rng.normal(size=body.positions.shape)
-    simulation = Simulation(body)
+    simulation = Simulation(body, integrator="Euler")
     simulation.set_state(positions, velocities)
     start = np.where(body.fixed[:, None], body.positions, positions)
     assert np.abs(simulation.state.positions - start).max() < 1e-13

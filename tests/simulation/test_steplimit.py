@@ -148,14 +148,15 @@ def test_warning_names_what_will_do():
     body = network(d1=(30.0, 60.0))
     limit = stability_limit(body, "Euler")
     with pytest.warns(StabilityWarning, match=r"step 50 ms is above .* ms, .*integrator Euler"):
-        mcmj.Simulation(body, timestep=0.05)
+        mcmj.Simulation(body, timestep=0.05, integrator="Euler")
     assert issubclass(StabilityWarning, McmjWarning)
     advice = recommend(body, 0.05, "Euler")
     assert advice.limit == limit
     assert f"substeps={advice.substeps}" in str(advice)
     assert "integrator='discrete'" in str(advice)
     assert 0.05 / advice.substeps < limit < 0.05 / (advice.substeps - 4)
-    mcmj.Simulation(body, timestep=0.05, substeps=advice.substeps).rollout(100)  # no warning
+    substeps = {"substeps": advice.substeps, "integrator": "Euler"}
+    mcmj.Simulation(body, timestep=0.05, **substeps).rollout(100)  # no warning
     for other in advice.others:
         sim = mcmj.Simulation(body, timestep=0.05, integrator=other)
         sim.set_state(velocities=np.full((body.n_nodes, 2), 1e-3))

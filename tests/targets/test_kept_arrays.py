@@ -1,14 +1,16 @@
 """Arrays kept on the disk: the same as computed; a damaged or forbidden cache is harmless."""
 
 import os
+import sys
 
 import numpy as np
 import pytest
 
 from mcmj.targets import kept_arrays as module
 from mcmj.targets.gaits import GAITS
-from mcmj.targets.kept_arrays import cache_folder, kept_arrays
+from mcmj.targets.kept_arrays import kept_arrays
 from mcmj.targets.limit_cycles import quadratic
+from mcmj.utils.files import cache_folder
 
 WANTED = {"a": np.arange(6.0).reshape(2, 3), "b 1": np.array(np.pi)}
 
@@ -85,7 +87,7 @@ def test_the_newest_stay(folder, monkeypatch):
 
 def test_the_place_is_the_system_s(monkeypatch, tmp_path):
     monkeypatch.delenv("MCMJ_CACHE_DIR")
-    monkeypatch.setattr(module.sys, "platform", "linux")
+    monkeypatch.setattr(sys, "platform", "linux")
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     assert cache_folder() == tmp_path / "mcmj"
 

@@ -22,6 +22,8 @@ STUDY = "from mcmj.search.study import Study; Study('s', {}, {'x': 1}, 0, startu
 @pytest.mark.parametrize(
     ("package", "extra", "use"),
     [
+        ("sympy", "theory", "import mcmj.analysis.lie_brackets"),
+        ("sympy", "theory", "import mcmj.experiments.emulate.command"),
         ("xarray", "files", "import mcmj.simulation.trajectory_files.zarr"),
         ("zarr", "files", "import mcmj.simulation.trajectory_files.zarr"),
         ("h5py", "files", "import mcmj.simulation.trajectory_files.openprc"),

@@ -73,7 +73,7 @@ def check_memoryless(reservoir: Reservoir) -> None:
     if isinstance(reservoir, Simulation):
         options = reservoir.options
         if integrator_named(options.integrator).by_callback:
-            wanted = "one of MuJoCo's own, without memory"
+            wanted = "one of MuJoCo's own, without memory, as 'Euler'"
             raise InvalidArgumentError("integrator", wanted, repr(options.integrator))
         if options.substeps > 1:
             raise InvalidArgumentError("substeps", "1: sensors hold otherwise", options.substeps)

@@ -5,7 +5,7 @@ import numpy as np
 from mcmj.analysis.stability.basin import judge, pushed, survey
 from mcmj.analysis.stability.cycle import Cycle, weights_at
 from mcmj.analysis.stability.floquet import Floquet
-from mcmj.analysis.stability.loop import ClosedLoop, require_planar
+from mcmj.analysis.stability.loop import INTEGRATOR, ClosedLoop, require_planar
 from mcmj.analysis.stability.tolerance import Trial
 from mcmj.simulation.ensemble import Ensemble
 from mcmj.targets.limit_cycles import Target
@@ -83,7 +83,7 @@ def _ensemble(loop: ClosedLoop, states: Array) -> Ensemble:
     require_planar(loop, "have a twin to be confirmed; a ReservoirLoop runs in MuJoCo itself")
     ensemble = Ensemble(
         loop.body, copies=len(states), threads=loop.threads, w_out=loop.w_out,
-        timestep=loop.timestep, integrator="Euler",
+        timestep=loop.timestep, integrator=INTEGRATOR,
     )  # fmt: skip
     ensemble.set_state(*loop.nodes(states))
     return ensemble

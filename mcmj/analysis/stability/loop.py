@@ -3,7 +3,8 @@
     z_{k+1} = Phi(z_k, u_k),   z = (positions of the free nodes, their velocities), n = 4 x free
 
 Phi is one step of the compiled twin of MuJoCo's Euler; z leaves nothing out, because the
-readout is static and the outputs are fed back in the step in which they are read.
+readout is static and the outputs are fed back in the step in which they are read. (The leapfrog
+has a memory. What a readout taught under it does under Euler differs by Euler's error.)
 """
 
 from dataclasses import dataclass, replace
@@ -12,6 +13,7 @@ import numpy as np
 
 from mcmj.analysis.loops.loop_map import LoopRun
 from mcmj.core.body import Body, require_plane, spring_lengths
+from mcmj.core.integrators import INTEGRATORS
 from mcmj.core.readout import Readout, checked_readout
 from mcmj.core.rollout_arguments import check_drive
 from mcmj.core.trajectory import State
@@ -19,7 +21,8 @@ from mcmj.reference.twin.population import Population
 from mcmj.utils.errors import InvalidArgumentError
 from mcmj.utils.validation import Array, as_array, require_count, require_number
 
-METHOD = "semi_implicit_euler"
+INTEGRATOR = "Euler"
+METHOD = INTEGRATORS[INTEGRATOR].twin
 
 
 @dataclass(frozen=True)

@@ -10,6 +10,8 @@ holds one callback of each kind per process: `install` refuses to replace one th
 ours, and `uninstall` takes ours out again.
 """
 
+import os
+import threading
 from collections.abc import Callable
 from typing import NamedTuple
 
@@ -24,6 +26,12 @@ from mcmj.core.callbacks.pointers import WORDS, CFunction
 from mcmj.core.callbacks.readout_law import COMPILE, fed_back
 from mcmj.core.callbacks.reservoir_law import compile_control
 from mcmj.utils.errors import McmjError
+
+_lock = threading.Lock()
+if hasattr(os, "register_at_fork"):  # else a child waits for a thread that it does not have
+    os.register_at_fork(
+        before=_lock.acquire, after_in_parent=_lock.release, after_in_child=_lock.release
+    )
 
 
 class Offsets(NamedTuple):
@@ -50,7 +58,7 @@ def _compile_readout() -> CFunction:
 
 
 class _Callback:
-    """One of MuJoCo's global callbacks, compiled at first use, installed once."""
+    """One of MuJoCo's global callbacks, compiled at first use, installed once, by any thread."""
 
     def __init__(self, name: str, compile_: Callable[[], CFunction]):
         self.name = name
@@ -61,6 +69,10 @@ class _Callback:
         return getattr(mujoco, f"get_{self.name}")()
 
     def install(self) -> None:
+        with _lock:  # else a second thread compiles the same, and takes it for another's
+            self._install()
+
+    def _install(self) -> None:
         current = self._installed()
         if self._function is not None and current is self._function:
             return

@@ -5,3 +5,4 @@ of its own sensors drives its own actuators, inside MuJoCo's step.
 """
 
 GROUP = "robots"
+EXTRA = "control"  # of pyproject.toml

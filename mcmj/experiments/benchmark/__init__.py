@@ -4,3 +4,4 @@ Ratios are medians, measured side by side.
 """
 
 GROUP = "speed and accuracy"
+EXTRA = "control"  # of pyproject.toml

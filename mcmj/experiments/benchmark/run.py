@@ -219,7 +219,8 @@ PARTS = (
 
 def _population(bodies: list[Body], **options: Any) -> Population:
     readouts = [small_readout(body) for body in bodies]
-    return Population(bodies, readouts, method="semi_implicit_euler", **options)
+    method = INTEGRATORS[DEFAULT_INTEGRATOR].twin
+    return Population(bodies, readouts, method=method, **options)
 
 
 def _twin_work(population: Population, steps: int, *, lengths: bool = True) -> Work:

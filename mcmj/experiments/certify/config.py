@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass, field
 
+from mcmj.analysis.stability.loop import INTEGRATOR
 from mcmj.experiments.limit_cycle import config as limit_cycle
 from mcmj.learning.lessons import Teaching
 from mcmj.metrics import orbits
@@ -18,7 +19,7 @@ from mcmj.utils.validation import (
 
 @dataclass(frozen=True)
 class Config:
-    """What to certify.
+    """What to certify, under MuJoCo's Euler, whose state has no memory.
 
     Attributes:
         task: van_der_pol, .., a .csv file or package.module:function.
@@ -79,5 +80,7 @@ class Config:
 
     @property
     def of_body(self) -> limit_cycle.Config:
-        """The limit-cycle experiment that has the same body."""
-        return limit_cycle.Config(task=self.task, body=self.body, seed=self.seed)
+        """The limit-cycle experiment that has the same body, under the integrator certified."""
+        return limit_cycle.Config(
+            task=self.task, body=self.body, seed=self.seed, integrator=INTEGRATOR
+        )

@@ -62,9 +62,9 @@ class _Trained(NamedTuple):
 
 
 def _trained(config: Config, goal: Target) -> _Trained:
-    body, readouts, _ = limit_cycle.get_body(config.of_body)
+    body, readouts, _, stepping = limit_cycle.get_body(config.of_body)
     require_outputs(body, goal)
-    simulation, w_out = Simulation(body), readouts.get(goal.name)
+    simulation, w_out = Simulation(body, **stepping), readouts.get(goal.name)
     if w_out is None:
         w_out = teach(simulation, goal, config.teaching, config.noise_seed).w_out
     else:

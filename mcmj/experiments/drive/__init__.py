@@ -4,3 +4,4 @@ The cross-entropy method learns it.
 """
 
 GROUP = "robots"
+EXTRA = "control"  # of pyproject.toml

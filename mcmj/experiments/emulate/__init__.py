@@ -4,3 +4,4 @@ Error and order of the static feedback, by integrator and step.
 """
 
 GROUP = "analysis"
+EXTRA = "theory"  # of pyproject.toml

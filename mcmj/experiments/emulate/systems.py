@@ -10,7 +10,6 @@ from functools import cache
 from math import cos, sin
 
 import numpy as np
-import sympy as sp
 
 from mcmj.analysis.emulation import (
     Acceleration,
@@ -21,7 +20,11 @@ from mcmj.analysis.emulation import (
 )
 from mcmj.core.callbacks.spring_laws import SpringLaw
 from mcmj.utils.errors import UnknownNameError
+from mcmj.utils.extras import extra
 from mcmj.utils.validation import Array
+
+with extra("theory", "emulation needs SymPy"):
+    import sympy as sp
 
 DRIVE_AMPLITUDE, DRIVE_RATE = 0.37, 1.2  # N, rad/s
 PACE = 0.1  # of Lorenz's time: a run of 8 s is then still predictable

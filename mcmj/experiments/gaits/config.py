@@ -1,6 +1,6 @@
 """What the gaits experiment runs: its Config, and the body and readouts it asks for."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import permutations
 
 from mcmj.core.body import Body
@@ -9,10 +9,10 @@ from mcmj.experiments.body_source import BodySource
 from mcmj.learning.lessons import Teaching
 from mcmj.learning.practice import Practice
 from mcmj.metrics import orbits
+from mcmj.mjcf.bundled import StoredBody
 from mcmj.targets.gaits import GAITS, LEGS, gait_target
 from mcmj.utils.errors import InvalidArgumentError
 from mcmj.utils.validation import (
-    Array,
     require_count,
     require_duration,
     require_names,
@@ -95,13 +95,11 @@ class Config:
         return tuple(permutations(self.gaits, 2))
 
 
-def get_body(config: Config, seed: int) -> tuple[Body, dict[str, Array], dict[str, object]]:
-    """The body of a seed, or the config's; the readouts that came with it; its provenance."""
+def get_body(config: Config, seed: int) -> StoredBody:
+    """The body of a seed, or the config's, with the readouts that it holds for the gaits."""
     stored = config.source.get(seed)
-    stored.take(timestep=config.timestep)
     held = stored.readouts
-    readouts = {name: held[name] for name in config.gaits if name in held}
-    return stored.body, readouts, stored.provenance
+    return replace(stored, readouts={name: held[name] for name in config.gaits if name in held})
 
 
 def check(config: Config, body: Body) -> None:

@@ -1,6 +1,7 @@
 """What becomes of the gaits of a body: runs with their errors, and their tables."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -60,10 +61,15 @@ class Taught:
 
 @dataclass(frozen=True)
 class BodyResult:
-    """One body: its gaits, and the switches between them by (from, to)."""
+    """One body: its gaits, and the switches between them by (from, to).
+
+    Attributes:
+        stepping: arguments of the Simulation.
+    """
 
     body: Body
     source: dict[str, object]
+    stepping: dict[str, Any]
     gaits: dict[str, Taught]
     switches: dict[tuple[str, str], GaitRun]
 
@@ -117,6 +123,11 @@ class Result:
     def body(self) -> Body:
         """The first body."""
         return self.first.body
+
+    @property
+    def stepping(self) -> dict[str, Any]:
+        """Arguments of the first body's Simulation."""
+        return self.first.stepping
 
     @property
     def readouts(self) -> dict[str, Array]:

@@ -5,7 +5,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mcmj.core.body import Body
 from mcmj.core.readout import checked_readout
 from mcmj.experiments.blow_ups import or_lost
 from mcmj.experiments.gaits.config import Config, check, get_body
@@ -15,6 +14,7 @@ from mcmj.learning.practice import practise
 from mcmj.learning.regression import Fit
 from mcmj.learning.teaching import Course, lessons_of, synchronise
 from mcmj.metrics import orbits
+from mcmj.mjcf.bundled import StoredBody
 from mcmj.simulation.phases import Phase, Schedule
 from mcmj.simulation.run_phases import run_schedule
 from mcmj.simulation.simulation import Simulation
@@ -36,8 +36,7 @@ def run(config: Config, *, on_steps: OnSteps = lambda steps: None) -> Result:
     """
     first, outcomes = None, []
     for seed in config.source.all_seeds:
-        body, readouts, source = get_body(config, seed)
-        result = run_body(config, body, readouts, seed, source=source, on_steps=on_steps)
+        result = run_body(config, get_body(config, seed), seed, on_steps=on_steps)
         outcomes.append(outcome(result, seed, config.tolerance))
         first = first or result  # the outputs of the others are not kept
     assert first is not None
@@ -46,11 +45,9 @@ def run(config: Config, *, on_steps: OnSteps = lambda steps: None) -> Result:
 
 def run_body(
     config: Config,
-    body: Body,
-    readouts: Mapping[str, object],
+    stored: StoredBody,
     seed: int,
     *,
-    source: Mapping[str, object] | None = None,
     on_steps: OnSteps = lambda steps: None,
 ) -> BodyResult:
     """All gaits and switches of one body; gaits without a readout are taught.
@@ -59,12 +56,14 @@ def run_body(
         InvalidArgumentError, UnknownNameError: a body without four feedback channels, a readout
             of a wrong size or for another gait.
     """
+    body, readouts = stored.body, stored.readouts
     check(config, body)
     for name in readouts:
         if name not in config.gaits:
             raise UnknownNameError("gait", name, config.gaits)
     given = {name: checked_readout(body, w, f"readout {name}") for name, w in readouts.items()}
-    simulation = Simulation(body, timestep=config.timestep, engine=config.engine)
+    stepping = stored.take(timestep=config.timestep, engine=config.engine)
+    simulation = Simulation(body, **stepping)
     learnt = {
         name: _learn(config, simulation, name, given.get(name), seed, on_steps)
         for name in config.gaits
@@ -79,7 +78,7 @@ def run_body(
         simulation.reset()
         simulation.restore(running[first])
         switches[first, second] = _switch(config, simulation, gaits[first], gaits[second], on_steps)
-    return BodyResult(body, dict(source or {}), gaits, switches)
+    return BodyResult(body, stored.provenance, stepping, gaits, switches)
 
 
 @dataclass

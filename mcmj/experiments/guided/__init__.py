@@ -4,3 +4,4 @@ Judged on bodies that it has not seen. Killed at any moment, the same command go
 """
 
 GROUP = "search"
+EXTRA = "search"  # of pyproject.toml

@@ -4,6 +4,7 @@ from pathlib import Path
 
 from rich.console import Console
 
+from mcmj.core.integrators import DEFAULT_INTEGRATOR
 from mcmj.experiments.base import Experiment, counting, table_of
 from mcmj.experiments.input_driven.config import Config, total_steps
 from mcmj.experiments.input_driven.figure import figures
@@ -30,6 +31,7 @@ def body_file(result: Result) -> str:
     return to_mjcf(
         result.body,
         timestep=config.timestep,
+        integrator=start.stepping.get("integrator", DEFAULT_INTEGRATOR),
         w_out=first.w_out,
         readouts=result.readouts,
         provenance={"body": start.source, "taught_inputs": start.taught, "lessons": lessons},

@@ -2,6 +2,7 @@
 
 import warnings
 from dataclasses import dataclass
+from typing import Any
 
 from mcmj.core.body import Body
 from mcmj.core.random_body import BodySettings
@@ -154,6 +155,7 @@ class Start:
         readouts: all that the file holds, by name.
         source: where the body comes from.
         lessons: what each of the readouts was taught with, by name.
+        stepping: arguments of the Simulation.
     """
 
     body: Body
@@ -162,6 +164,7 @@ class Start:
     readouts: dict[str, Array]
     source: dict[str, object]
     lessons: dict[str, object]
+    stepping: dict[str, Any]
 
 
 def get_start(config: Config, seed: int) -> Start:
@@ -174,14 +177,14 @@ def get_start(config: Config, seed: int) -> Start:
     course = config.course
     taught = (course.low, course.high)
     stored = config.source.get(seed)
-    stored.take(timestep=config.timestep)
+    stepping = stored.take(timestep=config.timestep, engine=config.engine)
     body, readouts, account = stored.body, stored.readouts, stored.provenance
     check_channels(body)
     w_out = None if config.teach else _readout(config.readout, stored.w_out, readouts)
     if w_out is not None:
         taught = tuple(account.get("taught_inputs", taught))
     source, lessons = account.get("body", account), account.get("lessons", {})
-    return Start(body, w_out, taught, readouts, source, lessons)
+    return Start(body, w_out, taught, readouts, source, lessons, stepping)
 
 
 def _readout(name: str | None, active: Array | None, readouts: dict[str, Array]) -> Array | None:

@@ -56,7 +56,7 @@ def run(config: Config, *, on_steps: OnSteps = lambda steps: None) -> Result:
 
 
 def _of_first(config: Config, start: Start, lesson: Lesson | None, on_steps: OnSteps) -> BodyResult:
-    simulation = Simulation(start.body, timestep=config.timestep, engine=config.engine)
+    simulation = Simulation(start.body, **start.stepping)
     if lesson is None:
         practised = None
         _lead_in(config, simulation)
@@ -76,8 +76,8 @@ def _of_first(config: Config, start: Start, lesson: Lesson | None, on_steps: OnS
 def _of_seed(config: Config, seed: int, lesson: Lesson | None, on_steps: OnSteps) -> Outcome:
     """A random body, taught and tried."""
     assert lesson is not None
-    body = get_start(config, seed).body
-    simulation = Simulation(body, timestep=config.timestep, engine=config.engine)
+    start = get_start(config, seed)
+    simulation = Simulation(start.body, **start.stepping)
     practised = or_lost(lambda: teach(config, simulation, lesson, seed, on_steps), None)
     if practised is None:
         return Outcome(dict.fromkeys(config.inputs, np.inf), ())

@@ -4,7 +4,6 @@ from dataclasses import dataclass, field, fields, replace
 from typing import Any
 
 from mcmj.core.body import Body
-from mcmj.core.integrators import DEFAULT_INTEGRATOR
 from mcmj.core.options import ENGINES
 from mcmj.core.random_body import BodySettings
 from mcmj.experiments.body_source import BodySource
@@ -22,7 +21,7 @@ from mcmj.utils.validation import (
     require_timestep,
 )
 
-Found = tuple[Body, dict[str, Array], dict[str, object]]  # what get_body gives
+Found = tuple[Body, dict[str, Array], dict[str, object], dict[str, Any]]  # what get_body gives
 
 
 @dataclass(frozen=True)
@@ -42,7 +41,7 @@ class Config:
         free_run: length of the free run in closed loop [s].
         window: the errors are those of this last part of it [s].
         timestep: control and physics step [s].
-        integrator: as for Simulation.
+        integrator: as for Simulation; default: the body file's, or Simulation's.
         engine: mujoco, or twin: faster, the same to rounding, no video.
         windows: length [s] of the consecutive windows of the free run whose errors are given
             too; 0: none.
@@ -59,7 +58,7 @@ class Config:
     free_run: float = 120.0
     window: float = 20.0
     timestep: float = 1e-3
-    integrator: str = DEFAULT_INTEGRATOR
+    integrator: str | None = None
     engine: str = "mujoco"
     windows: float = WINDOW
     measure_cost: bool = True
@@ -96,13 +95,15 @@ class Config:
 
 
 def get_body(config: Config) -> Found:
-    """The config's body, the readouts that came with it, and where it comes from."""
+    """The config's body, its readouts, where it comes from, and arguments of its Simulation."""
     stored = config.source.get(config.noise_seed)
-    stored.take(timestep=config.timestep, integrator=config.integrator)
+    stepping = stored.take(
+        timestep=config.timestep, integrator=config.integrator, engine=config.engine
+    )
     readouts = stored.readouts
     if not readouts and stored.w_out is not None and config.task != "all":
         readouts = dict.fromkeys(config.targets, stored.w_out)
-    return stored.body, readouts, stored.provenance
+    return stored.body, readouts, stored.provenance, stepping
 
 
 def of_seed(config: Any, index: int) -> Config:

@@ -1,5 +1,8 @@
 """What the closed loop costs beside a bare mj_step loop."""
 
+from collections.abc import Mapping
+from typing import Any
+
 import mujoco
 import numpy as np
 
@@ -12,16 +15,17 @@ STEPS = 4000
 REPEATS = 7
 
 
-def closed_loop_cost(
-    body: Body, w_out: Array, *, timestep: float, integrator: str
-) -> tuple[float, float]:
+def closed_loop_cost(body: Body, w_out: Array, stepping: Mapping[str, Any]) -> tuple[float, float]:
     """Steps a second in closed loop with lengths and outputs recorded, and its cost ratio.
 
     The ratio is the median over REPEATS of the time for STEPS control steps through
     Simulation.rollout, over the time of as many bare mj_step of the same model from the same
     state with the loop open, measured in turns.
+
+    Args:
+        stepping: arguments of the Simulation; the engine is MuJoCo.
     """
-    simulation = Simulation(body, w_out=w_out, timestep=timestep, integrator=integrator)
+    simulation = Simulation(body, w_out=w_out, **{**stepping, "engine": "mujoco"})
     bare, free = mujoco.MjData(simulation.model), body.free
 
     def step_bare() -> None:

@@ -38,6 +38,7 @@ class Result:
     """All tasks of one body, and what the closed loop costs, if that was measured.
 
     Attributes:
+        stepping: arguments of the Simulation.
         tasks: without those on which one of several bodies blew up.
         seeds: how all bodies did, if there are several.
     """
@@ -45,6 +46,7 @@ class Result:
     config: Config
     body: Body
     source: dict[str, object]
+    stepping: dict[str, Any]
     tasks: dict[str, TaskResult]
     checkpoints: dict[str, Checkpoint]
     steps_per_second: float | None

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from mcmj.core.body import Body
+from mcmj.core.integrators import DEFAULT_INTEGRATOR
 from mcmj.experiments.limit_cycle.config import Config, Found, check_task, get_body
 from mcmj.experiments.limit_cycle.loop_cost import closed_loop_cost
 from mcmj.experiments.limit_cycle.result import Result, TaskResult
@@ -35,8 +35,9 @@ Outcomes = dict[str, TaskResult | DivergenceError]
 
 def checkpoints(config: Config, folder: Path, found: Found) -> dict[str, Checkpoint]:
     """Where the free runs of a config keep what they need to go on, one a task."""
-    body, readouts, _ = found
-    xml = to_mjcf(body, readouts=readouts).encode()
+    body, readouts, _, stepping = found
+    integrator = stepping.get("integrator", DEFAULT_INTEGRATOR)
+    xml = to_mjcf(body, readouts=readouts, integrator=integrator).encode()
 
     def account(wanted: Target) -> list[object]:
         orbit = wanted.orbit(orbits.ORBIT_POINTS)  # a file may have changed under the same name
@@ -64,7 +65,7 @@ def run(
         CheckpointError: a checkpoint is damaged.
         OutputError: another run is at work in the folder, or it cannot be written.
     """
-    found = body, _, source = get_body(config)
+    found = body, _, source, stepping = get_body(config)
     kept = {} if folder is None else checkpoints(config, folder, found)
     with nullcontext() if folder is None else only_run(folder):
         outcomes = run_tasks(config, found, kept, on_steps=on_steps)
@@ -77,11 +78,9 @@ def run(
     speed = ratio = None
     if config.measure_cost and tasks:
         w_out = next(iter(tasks.values())).w_out
-        speed, ratio = closed_loop_cost(
-            body, w_out, timestep=config.timestep, integrator=config.integrator
-        )
+        speed, ratio = closed_loop_cost(body, w_out, stepping)
     seeds = _over_seeds(config, outcomes, on_steps) if config.seeds > 1 else None
-    return Result(config, body, source, tasks, kept, speed, ratio, seeds)
+    return Result(config, body, source, stepping, tasks, kept, speed, ratio, seeds)
 
 
 def _over_seeds(config: Config, first: Outcomes, on_steps: OnSteps) -> SuccessOfSeeds:
@@ -125,7 +124,7 @@ def run_tasks(
     Raises:
         BodyFileError, InvalidArgumentError: a body that cannot do the task.
     """
-    body, readouts, _ = found
+    body, readouts, _, stepping = found
     targets = config.targets
     for wanted in targets.values():
         check_task(config, body, wanted)
@@ -133,8 +132,9 @@ def run_tasks(
     def outcome(name: str, report: OnSteps) -> TaskResult | DivergenceError:
         try:
             return _run_task(
-                config, body, targets[name], readouts.get(name), kept.get(name), report
-            )
+                config, Simulation(body, **stepping), targets[name], readouts.get(name),
+                kept.get(name), report,
+            )  # fmt: skip
         except DivergenceError as error:
             return error
 
@@ -143,15 +143,12 @@ def run_tasks(
 
 def _run_task(
     config: Config,
-    body: Body,
+    simulation: Simulation,
     wanted: Target,
     w_out: Array | None,
     checkpoint: Checkpoint | None,
     on_steps: OnSteps,
 ) -> TaskResult:
-    simulation = Simulation(
-        body, timestep=config.timestep, integrator=config.integrator, engine=config.engine
-    )
     resumed = None if checkpoint is None else resume(simulation, checkpoint)
     if resumed is None:
         done, fit = None, _ready(simulation, config, wanted, w_out, on_steps)

@@ -35,14 +35,15 @@ def run(config: Config, *, on_steps: OnSteps = lambda steps: None) -> Result:
 def get_body(config: Config, seed: int) -> tuple[Body, dict[str, object], dict[str, Any]]:
     """The body of a seed, or the config's; where it comes from; arguments of its Simulation."""
     stored = config.source.get(seed)
-    names = ("integrator", "springs") if config.engine != "twin" else ()
-    return stored.body, stored.provenance, stored.take(*names, timestep=config.timestep)
+    names = ("springs",) if config.engine != "twin" else ()
+    stepping = stored.take(*names, timestep=config.timestep, engine=config.engine)
+    return stored.body, stored.provenance, stepping
 
 
 def _of_body(config: Config, seed: int, wanted: Target, on_steps: OnSteps) -> BodyResult:
     body, source, settings = get_body(config, seed)
     require_outputs(body, wanted)
-    simulation = Simulation(body, engine=config.engine, **settings)
+    simulation = Simulation(body, **settings)
     curve = [Phase(config.window, length_noise=std) for std in config.noise_curve]
     fit = or_lost(lambda: teach(simulation, wanted, config.teaching, seed, on_steps=on_steps), None)
     if fit is None:

@@ -26,10 +26,10 @@ def run(config: Config, *, on_steps: OnSteps = lambda steps: None) -> Result:
 
 
 def _of_body(one: limit_cycle.Config, config: Config, on_steps: OnSteps) -> Pruned:
-    body, _, _ = limit_cycle.get_body(one)
+    body, _, _, stepping = limit_cycle.get_body(one)
     wanted, teaching = named_target(config.task), config.teaching
     limit_cycle.check_task(one, body, wanted)
-    simulation = Simulation(body, timestep=config.timestep, engine=config.engine)
+    simulation = Simulation(body, **stepping)
     course = Course(simulation, teaching, one.noise_seed)
     course.attend_all(lessons_of(wanted, teaching))
     regression = course.regression

@@ -6,3 +6,4 @@ finished trials are in the store. Example: mcmj search --seeds 100 --set task=qu
 """
 
 GROUP = "search"
+EXTRA = "search"  # of pyproject.toml

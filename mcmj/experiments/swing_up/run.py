@@ -2,7 +2,6 @@
 
 import numpy as np
 
-from mcmj.core.body import Body
 from mcmj.experiments.blow_ups import or_lost
 from mcmj.experiments.limit_cycle import config as limit_cycle
 from mcmj.experiments.swing_up.config import Config
@@ -33,14 +32,16 @@ def run(config: Config, *, on_steps: OnSteps = lambda steps: None) -> Result:
     targets = config.of_seed(0).targets
     pairs = [(config.of_seed(index), name) for index in range(config.seeds) for name in targets]
     first = pairs[0][0]
-    first_body, _, _ = limit_cycle.get_body(first)
+    first_found = limit_cycle.get_body(first)
+    first_body = first_found[0]
     for wanted in targets.values():
         limit_cycle.check_task(first, first_body, wanted)
 
     def work(pair: tuple[limit_cycle.Config, str], report: OnSteps) -> SwingUp:
         one, name = pair
-        body = first_body if one == first else limit_cycle.get_body(one)[0]
-        return _swing_up(config, body, targets[name], one.noise_seed, report)
+        body, _, _, stepping = first_found if one == first else limit_cycle.get_body(one)
+        simulation = Simulation(body, **stepping)
+        return _swing_up(config, simulation, targets[name], one.noise_seed, report)
 
     runs = iter(in_threads(work, pairs, on_steps))
     return Result(
@@ -48,9 +49,11 @@ def run(config: Config, *, on_steps: OnSteps = lambda steps: None) -> Result:
     )
 
 
-def _swing_up(config: Config, body: Body, wanted: Target, seed: int, on_steps: OnSteps) -> SwingUp:
+def _swing_up(
+    config: Config, simulation: Simulation, wanted: Target, seed: int, on_steps: OnSteps
+) -> SwingUp:
     """Readouts in body files are not used: they were taught to run, not to swing up."""
-    simulation = Simulation(body, timestep=config.timestep, engine=config.engine)
+    body = simulation.body
     course = Course(simulation, config.teaching, seed)
     try:
         course.attend_all(lessons_of(wanted, config.teaching), on_steps=on_steps)

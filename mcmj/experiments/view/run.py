@@ -5,9 +5,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mcmj.core.body import Body
+from mcmj.experiments.body_source import readouts_of
 from mcmj.learning.lessons import Teaching
-from mcmj.learning.teaching import synchronise, teach
+from mcmj.learning.teaching import synchronise
 from mcmj.metrics import orbits
 from mcmj.mjcf.bundled import open_body
 from mcmj.pictures.film import deformation_scale
@@ -139,9 +139,9 @@ def _window(config: Config) -> tuple[Viewer, LiveLoop]:
             raise InvalidArgumentError("body", "a file with a readout", config.body)
         loop = LiveLoop(reservoir, {"readout": reservoir.w_out})
         return Viewer(loop, lambda: loop.kick(config.kick_speed, kicks)), loop
-    body, readouts = _body_and_readouts(config)
-    first = next(iter(readouts))
-    simulation, scale = _start(body, first, readouts[first])
+    simulation, readouts = _simulation_and_readouts(config)
+    body, first = simulation.body, next(iter(readouts))
+    scale = _start(simulation, first, readouts[first])
     body_loop = LiveLoop(simulation, readouts)
     scale = config.deformation or scale
     window = BodyViewer(
@@ -150,23 +150,15 @@ def _window(config: Config) -> tuple[Viewer, LiveLoop]:
     return window, body_loop
 
 
-def _body_and_readouts(config: Config) -> tuple[Body, dict[str, Array]]:
-    """The file's readouts by name; taught ones if it has none."""
+def _simulation_and_readouts(config: Config) -> tuple[Simulation, dict[str, Array]]:
+    """As the file says."""
     stored = open_body(config.body)
-    stored.take()
-    body, readouts = stored.body, stored.readouts
-    if not readouts and stored.w_out is not None:
-        return body, {"readout": stored.w_out}
-    if not readouts:
-        for name in TARGETS:
-            simulation = Simulation(body, engine="twin")
-            readouts[name] = teach(simulation, target(name), Teaching(), config.seed).w_out
-    return body, readouts
+    readouts = readouts_of(stored, config.seed, engine="twin")
+    return Simulation(stored.body, **stored.take()), readouts
 
 
-def _start(body: Body, name: str, w_out: Array) -> tuple[Simulation, float]:
-    """On the target if the readout is named after one, else at rest; and a scale for the window."""
-    simulation = Simulation(body)
+def _start(simulation: Simulation, name: str, w_out: Array) -> float:
+    """Onto the target if the readout is named after one, else at rest; a scale for the window."""
     if name in TARGETS:
         synchronise(simulation, target(name), Teaching().washout)
     start = simulation.snapshot()
@@ -174,4 +166,4 @@ def _start(body: Body, name: str, w_out: Array) -> tuple[Simulation, float]:
     steps = round(TRIAL / simulation.timestep)
     trial = simulation.rollout(steps, record=("positions",))
     simulation.restore(start)
-    return simulation, deformation_scale(body, trial.get("positions"))
+    return deformation_scale(simulation.body, trial.get("positions"))

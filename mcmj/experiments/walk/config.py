@@ -7,6 +7,7 @@ from mcmj.core.body import Body
 from mcmj.mjcf.bundled import open_body
 from mcmj.robots.quadruped import Quadruped
 from mcmj.robots.recorded_walk import PUSH_DURATION
+from mcmj.robots.walk_scene import INTEGRATOR
 from mcmj.targets.gaits import GAITS, LEGS
 from mcmj.utils.errors import InvalidArgumentError, UnknownNameError
 from mcmj.utils.validation import (
@@ -119,7 +120,7 @@ def get_body(config: Config) -> tuple[Body, dict[str, Array]]:
         InvalidArgumentError, UnknownNameError: a body without one of them, or not four legs.
     """
     stored = open_body(config.body)
-    stored.take(timestep=config.timestep)
+    stored.take(timestep=config.timestep, integrator=INTEGRATOR)
     body, readouts = stored.body, stored.readouts
     if body.n_outputs != len(LEGS):
         raise InvalidArgumentError("body", f"{len(LEGS)} feedback channels", body.n_outputs)

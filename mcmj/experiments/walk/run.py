@@ -15,6 +15,7 @@ from mcmj.experiments.walk.lesson import Table, WalkLesson, each, learn, states_
 from mcmj.experiments.walk.recover import recover
 from mcmj.robots import walk_metrics
 from mcmj.robots.walk_metrics import Walk
+from mcmj.robots.walk_scene import INTEGRATOR
 from mcmj.robots.walker import Walker
 from mcmj.simulation.simulation import Simulation
 from mcmj.utils.progress import OnSteps
@@ -172,7 +173,7 @@ def step_cost(lesson: WalkLesson) -> Table:
     name = lesson.config.gaits[0]
     walker = lesson.walker()
     walker.start(lesson.gaits[name])
-    planar = Simulation(lesson.body, w_out=get_body(lesson.config)[1][name])
+    planar = Simulation(lesson.body, w_out=get_body(lesson.config)[1][name], integrator=INTEGRATOR)
     works = {
         "scene": lambda: walker.rollout(COST_STEPS, record=()),
         "planar": lambda: planar.rollout(COST_STEPS, record=()),

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from mcmj.core.integrators import DEFAULT_INTEGRATOR
 from mcmj.learning.lessons import Teaching
 from mcmj.learning.teaching import synchronise, teach
 from mcmj.mjcf.bundled import StoredBody, body_names, open_body
@@ -66,7 +67,11 @@ def assign(name: str, task: str | None = None, **stepping: Any) -> Assignment:
     task = task or choices[0]
     if task not in choices:
         raise UnknownNameError(f"task of {body!r}", task, set(choices))
-    w_out = readouts[task] if task in readouts else _taught(to_mjcf(body), task)
+    w_out = (
+        readouts[task]
+        if task in readouts
+        else _taught(to_mjcf(body), task, taken.get("integrator", DEFAULT_INTEGRATOR))
+    )
     held = np.full(body.n_inputs, DRIVEN.get(task, 0.0))
     return Assignment(Simulation(body, w_out=w_out, **taken), _target(task), held)
 
@@ -103,5 +108,6 @@ def _target(task: str) -> Target:
 
 
 @functools.cache
-def _taught(xml: str, task: str) -> Array:
-    return teach(Simulation(from_mjcf(xml)[0]), _target(task), Teaching(), seed=0).w_out
+def _taught(xml: str, task: str, integrator: str) -> Array:
+    simulation = Simulation(from_mjcf(xml)[0], integrator=integrator)
+    return teach(simulation, _target(task), Teaching(), seed=0).w_out

@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from mcmj.core.callbacks.reservoir_law import NUMERIC, Law, block
-from mcmj.core.integrators import integrator_named
+from mcmj.core.integrators import INTEGRATORS, integrator_named
 from mcmj.simulation.models.compiled import spec_of_compiled, take_numbers
 from mcmj.simulation.models.names import (
     Channels,
@@ -140,6 +140,7 @@ def adopt(
     require_count("feedback_delay", feedback_delay, 0)
     _check(spec)
     name_what_has_no_name(spec)
+    _take_out_leapfrog(spec)
     heard = resolved_sensors(spec, sensors)
     outputs = resolved_channels(spec, "channel", channels)
     if not outputs:
@@ -148,7 +149,20 @@ def adopt(
     found = _with_channels(spec, heard, outputs, driven, feedback_delay)
     if numbers is not None:
         take_numbers(numbers, found.model)
+        _take_out_leapfrog(found.model)
     return found
+
+
+def _take_out_leapfrog(model: mujoco.MjSpec | mujoco.MjModel) -> None:
+    """Let a body's file run under Euler, whatever callbacks are installed: others have no tag."""
+    for row in INTEGRATORS.values():
+        if not row.by_callback:
+            continue
+        if isinstance(model, mujoco.MjSpec):
+            if (tag := model.numeric(row.name)) is not None:
+                tag.data = np.zeros(1)
+        elif mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_NUMERIC, row.name) >= 0:
+            model.numeric(row.name).data[:] = 0.0
 
 
 def _check(spec: mujoco.MjSpec) -> None:
