@@ -31,6 +31,7 @@ STUDY = "from mcmj.search.study import Study; Study('s', {}, {'x': 1}, 0, startu
         ("dm_control", "control", "import mcmj.experiments.adopt.suite_models"),
         ("dm_env", "control", "import mcmj.learning.environments.environment"),
         ("gymnasium", "gym", "import mcmj.learning.environments.gymnasium_env"),
+        ("sklearn", "sklearn", "import mcmj.learning.estimator"),
         ("optuna", "search", STUDY),
         ("pyarrow", "search", "import mcmj.search.export as e; e.write_parquet(None, 't.parquet')"),
         ("distributed", "cluster", "import mcmj.search.workers as w; w.Cluster('tcp://h:1')"),
