@@ -4,6 +4,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
+from matplotlib.ticker import LogLocator, NullFormatter
 
 from mcmj.experiments.design.fronts import Fronts
 from mcmj.experiments.design.predictors import TOGETHER, Predictors
@@ -59,7 +60,9 @@ def _draw_tried(axes: Axes, designs: Designs) -> None:
         ends = [*ended, most], [*share, len(ended) / len(numbers)]
         axes.step(*ends, where="post", color=COLOURS[kind], label=KINDS[kind])
     axes.set(xscale="log", xlabel="bodies tried", ylabel="share that passed", ylim=(0, 1.02))
+    axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
     axes.xaxis.set_major_formatter("{x:g}")
+    axes.xaxis.set_minor_formatter(NullFormatter())
     axes.set_title("until one passes its checks")
     axes.legend(frameon=False)
     axes.grid(alpha=0.3)

@@ -55,7 +55,7 @@ class Config:
     evaluations: int = 400
     spread: float = 0.5
     aim: float = 0.02
-    checks: int = 8
+    checks: int = 12
     threshold: float = 0.05
     judged: int = 3
     free_run: float = 300.0

@@ -107,7 +107,8 @@ def _errors(config: Config, body: Body) -> Array:
 
 def _evolve(config: Config, drawn: Body, weight: float, number: int) -> list[Array]:
     """Errors of all bodies tried on the way to the smallest weighted one."""
-    space, found = BodySpace(drawn, config.varied), []
+    space = BodySpace(drawn, config.varied)
+    found: list[Array] = []
     seed = config.seed + number  # other proposals for every weight
     evolution = Evolution(space.size, seed, spread=config.spread, bound=BOUND)
     while len(found) < config.tries:
