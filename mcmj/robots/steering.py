@@ -1,12 +1,12 @@
 """One number steers a robot: it enters the trunk as forces, and the readout stays as it is.
 
 What is taught depends on the input u, of which the readout knows only by what the forces do to
-the springs (trunk.TrunkSettings.steer). Strides, over the swing of the settings:
+the springs (trunk.TrunkSettings.steer):
 
-    turn    1 - 0.6 u of the left legs, 1 + 0.6 u of the right ones: to the left where u > 0
-    speed   0.7 + 0.5 u of all legs
+    turn    the feet go along circles, curvature 0.4 u [1/m] to the left
+    speed   strides are 0.8 + 0.4 u of the swing of the settings
 
-times those with which the robot walks straight ahead.
+besides the curvature with which the robot walks straight ahead.
 """
 
 from collections.abc import Callable, Sequence
@@ -16,11 +16,10 @@ import numpy as np
 import numpy.typing as npt
 
 from mcmj.metrics import orbits
-from mcmj.robots.trunk import Trunk, muscle_target, side
+from mcmj.robots.trunk import Trunk, muscle_target
 from mcmj.robots.trunk_walker import SAMPLE, has_fallen, new_robot, poses, stand, walk
 from mcmj.robots.walk_metrics import Walk, headings, joined
 from mcmj.simulation.reservoir import Reservoir
-from mcmj.targets.gaits import LEGS
 from mcmj.targets.limit_cycles import Target
 from mcmj.utils.errors import DivergenceError
 from mcmj.utils.seeds import stream
@@ -29,39 +28,44 @@ from mcmj.utils.validation import Array
 LEVELS = (-1.0, 0.0, 1.0)  # of u, whose cycles are known; between them they are interpolated
 RAMP = 0.5  # s, from one value of u to the next
 TELL = 0.1  # s, between an operator's commands
-# how strides are straightened: short walks [s], so many; degrees a second of unequal strides, as a
-# first guess; the most unequal ones
-WALK, WALKS, SLOPE, STEEPEST = 6.0, 4, 50.0, 0.6
+# how a way is straightened: short walks [s], so many; turning over curvature, as a first guess
+# [deg m/s]; the largest curvature [1/m]
+WALK, WALKS, SLOPE, STEEPEST = 6.0, 4, 60.0, 0.5
 
 
-def strides(steer: str, u: float) -> Array:
-    """Of the legs (n_legs,), over the swing of the settings."""
-    return np.full(len(LEGS), 0.7 + 0.5 * u) if steer == "speed" else uneven(0.6 * u)
+def steered_target(
+    trunk: Trunk, gait: str, pace: float, steer: str, u: float, straight: float
+) -> Target:
+    """The muscles' changes of length at an input.
+
+    Args:
+        straight: the curvature with which the robot walks straight ahead [1/m].
+    """
+    if steer == "speed":
+        return muscle_target(trunk, gait, pace, stride=0.8 + 0.4 * u, curvature=straight)
+    return muscle_target(trunk, gait, pace, curvature=straight + 0.4 * u)
 
 
-def straight_strides(trunk: Trunk, gait: str, pace: float) -> Array:
-    """Of the legs (n_legs,), with which a robot walks straight ahead under a teacher.
+def straight_curvature(trunk: Trunk, gait: str, pace: float) -> float:
+    """What to tell the feet [1/m], so that a robot walks straight ahead under a teacher.
 
-    The legs of a random trunk do not pull alike. 1 - e of the left legs and 1 + e of the right
-    ones, e by the secant method from how the robot turns in short walks; the best one counts.
+    The legs of a random trunk do not pull alike. By the secant method from how the robot turns in
+    short walks; the best one counts.
     """
     robot, tried = new_robot(trunk), dict[float, float]()
     stand(robot)
-    start, e = robot.snapshot(), 0.0
+    start, told = robot.snapshot(), 0.0
     for _ in range(WALKS):
         robot.restore(start)
-        tried[e] = _turning(robot, trunk, muscle_target(trunk, gait, pace, uneven(e)))
-        (e0, rate0), (e1, rate1) = (list(tried.items())[-2:] * 2)[:2]
-        slope = (rate1 - rate0) / (e1 - e0) if e1 != e0 else SLOPE
-        e = float(np.clip(e - tried[e] / max(slope, SLOPE / 4), -STEEPEST, STEEPEST))
-        if e in tried:
+        target = muscle_target(trunk, gait, pace, curvature=told)
+        tried[told] = _turning(robot, trunk, target)
+        (one, rate), (other, other_rate) = (list(tried.items())[-2:] * 2)[:2]
+        slope = (other_rate - rate) / (other - one) if other != one else SLOPE
+        told -= tried[told] / max(slope, SLOPE / 4)
+        told = float(np.clip(told, -STEEPEST, STEEPEST))
+        if told in tried:
             break
-    return uneven(min(tried, key=lambda e: abs(tried[e])))
-
-
-def uneven(e: float) -> Array:
-    """Strides (n_legs,), of the left legs 1 - e, of the right ones 1 + e."""
-    return np.array([1.0 - e * side(leg) for leg in LEGS])
+    return min(tried, key=lambda told: abs(tried[told]))
 
 
 def _turning(robot: Reservoir, trunk: Trunk, target: Target) -> float:
@@ -95,17 +99,24 @@ class Steered:
 
 
 def steered_gait(
-    trunk: Trunk, gait: str, pace: float, seed: int, *, duration: float, hold: float
+    trunk: Trunk,
+    gait: str,
+    pace: float,
+    straight: float,
+    seed: int,
+    *,
+    duration: float,
+    hold: float,
 ) -> Steered:
     """A gait and a course for a robot that has an input.
 
     Args:
+        straight: the curvature with which it walks straight ahead [1/m].
         seed: of the course.
         duration, hold: of the course, and of each value in it [s], in whole strides.
     """
     steer = trunk.settings.steer
-    straight = straight_strides(trunk, gait, pace)
-    cycles = {u: muscle_target(trunk, gait, pace, straight * strides(steer, u)) for u in LEVELS}
+    cycles = {u: steered_target(trunk, gait, pace, steer, u, straight) for u in LEVELS}
     period = cycles[0.0].period
     hold = period * max(1, round(hold / period))
     values = stream(seed, "task_inputs").uniform(-1.0, 1.0, max(2, round(duration / hold)))

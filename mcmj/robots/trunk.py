@@ -238,29 +238,39 @@ def _foot(settings: TrunkSettings, hips: Array, leg: str) -> list[float]:
     return [middle, side(leg) * settings.stance / 2, 0.0]
 
 
-def muscle_lengths(trunk: Trunk, swing: npt.ArrayLike, lift: npt.ArrayLike) -> Array:
+def muscle_lengths(
+    trunk: Trunk, swing: npt.ArrayLike, lift: npt.ArrayLike, curvature: float = 0.0
+) -> Array:
     """Changes c (T, n_muscles) [m] that bring feet without load to where a gait wants them.
 
     Args:
         swing: (T, n_legs) x_i, 1 being the amplitude forwards of the foot's place at rest.
         lift: (T, n_legs) z_i, 1 being the whole lift.
+        curvature: of the way, to the left [1/m], in space: feet go along circles about its centre.
     """
     x, z = np.asarray(swing, dtype=np.float64), np.asarray(lift, dtype=np.float64)
     body, settings = trunk.body, trunk.settings
-    muscles = body.springs[trunk.n_sensed :]
+    muscles, feet = body.springs[trunk.n_sensed :], body.positions[settings.nodes :]
     moved = np.zeros((len(x), len(LEGS), body.dimensions))
     moved[..., 0], moved[..., -1] = settings.swing * x, settings.lift * z
+    if body.dimensions == 3:
+        ahead, left = (feet - feet.mean(axis=0))[:, :2].T
+        moved[..., 1] = curvature * ahead * moved[..., 0]
+        moved[..., 0] *= 1.0 - curvature * left
     moved = np.repeat(moved, body.dimensions, axis=1)  # as many muscles a leg
     legs = body.positions[muscles[:, 1]] + moved - body.positions[muscles[:, 0]]
     found: Array = np.linalg.norm(legs, axis=-1) - body.rest_lengths[trunk.n_sensed :]
     return found
 
 
-def muscle_target(trunk: Trunk, gait: str, pace: float, stride: object = 1.0) -> Target:
+def muscle_target(
+    trunk: Trunk, gait: str, pace: float, *, stride: float = 1.0, curvature: float = 0.0
+) -> Target:
     """The muscles' changes of length in a gait of mcmj.targets.gaits, so many times faster.
 
     Args:
-        stride: (n_legs,) or a number: of each leg, over the swing of the settings.
+        stride: over the swing of the settings.
+        curvature: of the way, see `muscle_lengths`.
 
     Raises:
         UnknownNameError: no such gait.
@@ -270,7 +280,7 @@ def muscle_target(trunk: Trunk, gait: str, pace: float, stride: object = 1.0) ->
     lift = lift_of(np.vstack([swing] * 3))[POINTS : 2 * POINTS]  # no ends
     lag = trunk.settings.lags[list(GAITS).index(gait)]
     lift = np.roll(lift, round(lag * POINTS), axis=0)
-    lengths = muscle_lengths(trunk, np.asarray(stride) * swing, lift)
+    lengths = muscle_lengths(trunk, stride * swing, lift, curvature)
     return from_array(gait, lengths, cycle.period / pace / POINTS)
 
 

@@ -11,7 +11,7 @@ from mcmj.core.body import Body
 from mcmj.experiments.soft_robot.config import SPATIAL
 from mcmj.robots.energy import energy_balance
 from mcmj.robots.quadruped import GRAVITY
-from mcmj.robots.steering import LEVELS, PointFollower, steered_gait, straight_strides, strides
+from mcmj.robots.steering import LEVELS, PointFollower, steered_gait, steered_target
 from mcmj.robots.trunk import Trunk, draw_trunk, muscle_lengths, muscle_target
 from mcmj.robots.trunk_walker import heading_ahead, new_robot, poses, stand, walk
 from mcmj.robots.walk_metrics import headings
@@ -166,25 +166,51 @@ def test_an_inputs_forces_have_no_resultant_and_no_moment(steer):
     assert (body.w_in[-len(LEGS) :] == 0).all()
 
 
-def test_strides_turn_to_the_left_and_set_the_speed():
-    assert strides("turn", 0.5) == pytest.approx([0.7, 1.3, 0.7, 1.3])
-    assert strides("speed", -1.0) == pytest.approx([0.2] * 4)
+def test_feet_go_along_circles_about_the_centre_of_the_way(trunk):
+    """Seen from the centre, a foot's way is at right angles to its place, and as long as that."""
+    curvature, small = 0.4, 1e-6
+    swing = np.tile([0.0, small], (4, 1)).T
+    lengths = muscle_lengths(trunk, swing, 0 * swing, curvature)
+    muscles = trunk.body.springs[trunk.n_sensed :]
+    feet = trunk.body.positions[trunk.settings.nodes :]
+    centre = feet.mean(axis=0) + np.array([0.0, 1 / curvature, 0.0])
+    for leg in range(len(LEGS)):
+        own = slice(3 * leg, 3 * leg + 3)
+        along = feet[leg] - trunk.body.positions[muscles[own, 0]]
+        along /= np.linalg.norm(along, axis=1, keepdims=True)
+        way = np.linalg.solve(along, np.diff(lengths[:, own], axis=0)[0]) / small
+        away = feet[leg] - centre
+        circle = SPATIAL.swing * curvature * np.array([-away[1], away[0], 0.0])
+        assert way == pytest.approx(circle, abs=1e-6)
 
 
-def test_what_is_taught_along_the_course_is_the_cycle_of_the_input():
-    trunk = draw_trunk(4, replace(SPATIAL, steer="turn"))
-    steered = steered_gait(trunk, "trot", 16.0, 0, duration=20.0, hold=2.0)
-    straight = straight_strides(trunk, "trot", 16.0)
+@pytest.mark.parametrize("steer", ["turn", "speed"])
+def test_what_is_taught_along_the_course_is_the_cycle_of_the_input(steer):
+    trunk = draw_trunk(4, replace(SPATIAL, steer=steer))
+    steered = steered_gait(trunk, "trot", 16.0, 0.1, 0, duration=20.0, hold=2.0)
     times = np.arange(0.0, 20.0, 0.13)
     told, taught = steered.inputs(times)[:, 0], steered.target.sample(times)
     for time, u, row in zip(times, told, taught, strict=True):
         assert row == pytest.approx(steered.cycle(float(u)).sample([time])[0], abs=1e-12)
     for level in LEVELS:
-        exact = muscle_target(trunk, "trot", 16.0, straight * strides("turn", level))
+        exact = steered_target(trunk, "trot", 16.0, steer, level, 0.1)
         assert np.array_equal(steered.cycle(level).orbit(64), exact.orbit(64))
-    halfway = muscle_target(trunk, "trot", 16.0, straight * strides("turn", 0.5)).orbit(64)
+    halfway = steered_target(trunk, "trot", 16.0, steer, 0.5, 0.1).orbit(64)
     assert np.abs(steered.cycle(0.5).orbit(64) - halfway).max() < 0.002  # m; nearly linear
     assert np.ptp(told) > 1.0
+
+
+def test_under_a_teacher_it_turns_as_told():
+    trunk = draw_trunk(100, SPATIAL)
+    turned = []
+    for curvature in (-0.4, 0.4):
+        robot, target = new_robot(trunk), muscle_target(trunk, "walk", 15.0, curvature=curvature)
+        told = target.sample(robot.timestep * np.arange(7500))
+        run = robot.rollout(offset=told, gate=0.0, record=("qpos",)).thinned(25)
+        turned.append(np.degrees(np.ptp(headings(poses(trunk, run.get("qpos")))[[100, -1]])))
+        turned[-1] *= np.sign(headings(poses(trunk, run.get("qpos")))[-1])
+    assert turned[0] < -15.0
+    assert turned[1] > 15.0
 
 
 def test_an_operator_leads_a_point_that_turns_as_told_through_its_points():

@@ -17,7 +17,7 @@ SPATIAL = TrunkSettings(
     height=0.4, depth=0.5, leg=0.38, hip=0.44, stance=0.5, mass=26.0,
     d1=(80.0, 720.0), d3=(250.0, 550.0), foot=0.03,
     muscle_stiffness=6570.0, muscle_damping=105.0, muscle_strength=600.0,
-    swing=0.076, lift=0.045, lags=(0.1, 0.14, 0.18, 0.22),
+    swing=0.076, lift=0.045, lags=(0.1, 0.14, 0.18, 0.22), steer_force=240.0,
 )  # fmt: skip
 PARTS = (
     "regression", "practice", "rest", "push", "switch", "steps", "energy", "controls", "ground",
@@ -69,7 +69,7 @@ class Config(trunk.Config):
     heights: tuple[float, ...] = (0.01, 0.02)
     cut: float = 0.1
     steered: str = "walk"
-    steering: tuple[float, float] = (90.0, 3.0)
+    steering: tuple[float, float] = (90.0, 2.0)
     told: tuple[float, ...] = (-1.0, -0.8, -0.4, 0.0, 0.4, 0.8, 1.0)
     points: tuple[float, float] = (5.0, 0.5)
     gain: float = 2.0

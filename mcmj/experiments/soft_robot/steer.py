@@ -8,7 +8,15 @@ import numpy as np
 from mcmj.experiments.soft_robot.config import Config
 from mcmj.experiments.trunk.result import Table
 from mcmj.learning.force_learning import Learned, force_learn
-from mcmj.robots.steering import TELL, PointFollower, Steered, operate, steered_error, steered_gait
+from mcmj.robots.steering import (
+    TELL,
+    PointFollower,
+    Steered,
+    operate,
+    steered_error,
+    steered_gait,
+    straight_curvature,
+)
 from mcmj.robots.trunk import Trunk, draw_trunk
 from mcmj.robots.trunk_walker import has_fallen, new_robot, poses, stand
 from mcmj.robots.walk_metrics import Walk, headings
@@ -19,7 +27,7 @@ from mcmj.utils.validation import Array
 
 TRIED = (-0.8, 0.0, 0.8)  # inputs of a trial while learning
 SETTLE = 2.0  # s after a change of the input that is not measured
-LONGEST = 240.0  # s, on a path
+LONGEST = 150.0  # s, on a path
 
 
 @dataclass(frozen=True)
@@ -55,9 +63,13 @@ def learn_steered(config: Config, chosen: tuple[int, str], on_steps: OnSteps) ->
     seed, steer = chosen
     trunk = draw_trunk(seed, config.steered_trunk(steer))
     duration, hold = config.steering
-    steered = steered_gait(trunk, config.steered, config.pace, seed, duration=duration, hold=hold)
+    straight = straight_curvature(trunk, config.steered, config.pace)
+    steered = steered_gait(
+        trunk, config.steered, config.pace, straight, seed, duration=duration, hold=hold
+    )
     robot = new_robot(trunk)
-    learning = replace(config.learning, rounds=2, round_duration=duration / 2)
+    led = config.learning.washout + duration / 3  # the teacher shows many inputs first
+    learning = replace(config.learning, warm_up=led, rounds=2, round_duration=duration / 3)
     try:
         learned = force_learn(
             robot, steered.target, learning, seed=seed, stand=lambda: stand(robot),

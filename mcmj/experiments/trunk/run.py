@@ -11,7 +11,7 @@ from mcmj.experiments.trunk.parts import RUNS, push_summary
 from mcmj.experiments.trunk.result import LearnedGait, Result, Table, seeds_table, walk_table
 from mcmj.learning.force_learning import Learned, force_learn
 from mcmj.learning.trial import trial_error
-from mcmj.robots.steering import straight_strides
+from mcmj.robots.steering import straight_curvature
 from mcmj.robots.trunk import Trunk, draw_trunk, muscle_target
 from mcmj.robots.trunk_walker import has_fallen, new_robot, stand, walk
 from mcmj.simulation.reservoir import Reservoir
@@ -51,8 +51,8 @@ def learn(config: Config, chosen: tuple[int, str], on_steps: OnSteps) -> Learned
     seed, name = chosen
     trunk = draw_trunk(seed, config.trunk)
     flat = trunk.body.dimensions == 2
-    stride = 1.0 if flat else straight_strides(trunk, name, config.pace)
-    target = muscle_target(trunk, name, config.pace, stride)
+    straight = 0.0 if flat else straight_curvature(trunk, name, config.pace)
+    target = muscle_target(trunk, name, config.pace, curvature=straight)
     robot = new_robot(trunk)
     learned = learn_on(config, robot, trunk, target, seed, on_steps)
     walked = None if learned is None else or_lost(lambda: walk(robot, trunk, config.walking), None)
