@@ -75,6 +75,7 @@ MUJOCO = {
     "pictures.window.viewer",
     "pictures.walk_video",
     "robots.ground",
+    "robots.energy",
     "robots.trunk_walker",
     "robots.walk_scene",
     "simulation.batch_engine",
@@ -92,6 +93,7 @@ MUJOCO = {
 }
 EXTRAS = {
     "xarray": {"simulation.trajectory_files.zarr"},
+    "sklearn": {"learning.estimator"},
     "h5py": {"simulation.trajectory_files.openprc"},
     "gymnasium": {"learning.environments.gymnasium_env"},
     "dm_control": {"experiments.adopt.suite_models", "learning.environments.environment"},

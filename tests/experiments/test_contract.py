@@ -3,6 +3,7 @@
 import json
 from dataclasses import fields
 from fnmatch import fnmatch
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -53,9 +54,16 @@ TINY = {
     "--engine twin",
     "swing_up": f"{TAUGHT} --free-run 15 --window 12 --kicks 1 --rounds 0 --trial 13 "
     "--trial-window 12",
+    "soft_robot": (
+        "--gaits trot --parts energy --walking 3 --judged 1 --rounds 1 --round-duration 3 --trial 1"
+    ),
     "trunk": "--gaits trot --parts --walking 3 --judged 1 --rounds 1 --round-duration 4 --trial 2",
     "walk": "--parts walk --gaits trot --settle 2 --walking 3 --before 2 --after 2",
 }
+RECORDED = Path(__file__).parents[1] / "data" / "recorded"  # support/record.py
+TINY["fit"] = " ".join(
+    f"--{name} {RECORDED}/{name}.csv" for name in ("signals", "targets", "inputs")
+)
 APART = {"reproduce", "view", "web"}  # commands, a person, npm; tested on their own
 TIMED = {  # metrics that are times, by path; all others are the same in every run
     "benchmark": ("*",),
@@ -71,6 +79,7 @@ BAD = {  # an option that the experiment must refuse by its name, where it is no
     "success_rate": ("--seeds", "0"), "gaits": ("--seeds", "0"), "limit_cycle": ("--window", "-1"),
     "perturb": ("--seeds", "0"), "prune": ("--seeds", "0"), "swing_up": ("--seeds", "0"),
     "certify": ("--copies", "0"), "adopt": ("--seeds", "0"),
+    "fit": ("--washout", "-1"),
 }  # fmt: skip
 
 

@@ -306,6 +306,31 @@ def test_all_parts_of_trunk(tmp_path):
 
 
 @pytest.mark.slow
+def test_all_parts_of_soft_robot(tmp_path):
+    """Every part says something of every gait; seconds of learning are too few for more."""
+    options = ["--gaits", "trot", "bound", "--no-video", "--walking", "4", "--judged", "2"]
+    options += ["--rounds", "1", "--round-duration", "6", "--trial", "3", "--survive", "1.5"]
+    options += ["--teaching", "5", "--pushes", "1", "--impulses", "10", "--steering", "6", "1"]
+    status, _, err = run("soft_robot", *options, "--steps-ms", "0.2", "--out", tmp_path)
+    assert status == 0, err
+    metrics = metrics_of(tmp_path)["metrics"]
+    for name in ("trot", "bound"):
+        assert metrics[name]["upright"] == metrics[name]["of"] == 1
+        assert metrics[name]["speed_m_s"] > 0.1
+        assert metrics["energy"][name]["balance_error"] < 1e-3
+        assert metrics["push"]["survived"][name]["10"] == 2
+        assert metrics["controls"][name]["frozen"]["speed_m_s"] == pytest.approx(0.0, abs=0.05)
+        assert set(metrics["ground"][name]) == {
+            "slope -0.05", "slope -0.02", "slope 0.02", "slope 0.05", "step 10 mm", "step 20 mm",
+        }  # fmt: skip
+    assert set(metrics["switch"]) == {"trot_to_bound", "bound_to_trot"}
+    assert len(metrics["steer"]["robots"][0]["told"]) >= 7
+    assert (tmp_path / "soft_robot.png").stat().st_size > 10_000
+    with np.load(tmp_path / "readouts.npz") as arrays:
+        assert arrays["bound/w_out"].shape[1] == 12
+
+
+@pytest.mark.slow
 def test_certify(tmp_path):
     options = ["--task", "quadratic", "--body", "quadratic", "--free-run", "25", "--recovery", "25",
                "--scales", "1", "--phases", "2", "--kicks", "0.5", "--pushes", "1", "--copies", "4",

@@ -221,6 +221,13 @@ def test_what_a_page_cannot_do_is_said(tmp_path):
 # --- the package --------------------------------------------------------------------------------
 
 
+def test_out_may_name_the_page(package, tmp_path):
+    path = small_body(tmp_path)
+    main(["web", str(path), "--out", str(tmp_path / "mine.html"), "--quiet"])
+    assert (tmp_path / "mine.html").stat().st_size > 1e6
+    assert json.loads((tmp_path / "metrics.json").read_text())["scenario"] == "web"
+
+
 @pytest.fixture
 def no_cache(monkeypatch, tmp_path):
     """An empty cache, and only those programs that a test puts into `bin`."""

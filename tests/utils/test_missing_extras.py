@@ -32,6 +32,7 @@ EVOLUTION = "from mcmj.search.evolution import Evolution; Evolution(2, 0, spread
         ("dm_control", "control", "import mcmj.experiments.adopt.suite_models"),
         ("dm_env", "control", "import mcmj.learning.environments.environment"),
         ("gymnasium", "gym", "import mcmj.learning.environments.gymnasium_env"),
+        ("sklearn", "sklearn", "import mcmj.learning.estimator"),
         ("optuna", "search", STUDY),
         ("cmaes", "design", EVOLUTION),
         ("pyarrow", "search", "import mcmj.search.export as e; e.write_parquet(None, 't.parquet')"),

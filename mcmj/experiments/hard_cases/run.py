@@ -1,11 +1,15 @@
 """Hard cases: the largest stable step of each integrator, found by bisection and predicted.
 
 Each case is a body with a start that some integrator cannot bear at 1 ms. A step is stable
-here if the run stays finite and no spring gets further from its rest length than OVERSHOOT
-times the body and the exact motion; it may still be inaccurate. Beside it stand three
-predictions of `steplimit.stability_limit`: at rest, for motions of vanishing size; safe, where
-errors on top of the exact motion do not grow (tangents at each spring's largest elongation and
-rate); and blow-up, where the motion itself grows (secants there).
+here if the run stays finite, no spring gets further from its rest length than OVERSHOOT
+times the body and the exact motion, and a run whose forces and velocities at the start are larger
+by the share NUDGE moves no spring away by more than GROWTH times that share of what it moves at
+most. So a run that survives as noise is not stable; a stable one may still be inaccurate. No step
+is tried in which the motion is not resolved: in which the fastest change of a length would be half
+the mean length of a spring.
+
+Beside it stand predictions: at rest, for motions of vanishing size (`stability_limit`), and the
+bracket along the exact motion (`step_bracket`).
 """
 
 import math
@@ -15,20 +19,25 @@ from collections.abc import Callable
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from mcmj.core.body import spring_lengths
+from mcmj.core.body import Body, spring_lengths
 from mcmj.core.readout import Readout
 from mcmj.experiments.blow_ups import or_lost
 from mcmj.experiments.hard_cases.bodies import CASES, HardCase
 from mcmj.experiments.hard_cases.config import Config
 from mcmj.experiments.hard_cases.result import Result, Row
 from mcmj.reference.dop853 import accelerations
-from mcmj.simulation.simulation import Simulation
+from mcmj.simulation.ensemble import Ensemble
+from mcmj.simulation.stepsize.along_motion import KnownMotion, step_bracket
 from mcmj.simulation.stepsize.limit import stability_limit
 from mcmj.utils.errors import DivergenceError, StabilityWarning
 from mcmj.utils.progress import OnSteps
 from mcmj.utils.validation import Array
 
 OVERSHOOT = 10.0
+NUDGE = 1e-8
+GROWTH = 2.0
+ROUNDING = 1e-13  # m: of lengths of a metre, many steps
+SAMPLES, CLOSED_SAMPLES = 90, 30  # of the exact motion; a closed loop's limits take long
 LEAST_STEPS = 400  # of a run: time for a slow growth
 LONGEST = 1.0  # s: no longer step is tried
 
@@ -38,51 +47,58 @@ def run(config: Config, *, on_steps: OnSteps = lambda steps: None) -> Result:
     rows, amplitudes = [], {}
     for name in config.cases:
         case = CASES[name](config.seed)
-        x1, x2 = exact_amplitudes(case, config.duration)
+        motion = exact_motion(case, config.duration)
+        x1, x2 = amplitudes_of(case.body, motion)
         amplitudes[name] = (float(x1.max()), float(x2.max()))
         for integrator in config.integrators:
-            rows.append(_row(config, name, case, integrator, x1, x2))
+            rows.append(_row(config, name, integrator, motion))
             on_steps(1)
     return Result(config, tuple(rows), amplitudes)
 
 
-def _row(config: Config, name: str, case: HardCase, integrator: str, x1: Array, x2: Array) -> Row:
-    reach = OVERSHOOT * (np.ptp(case.body.positions, axis=0).max() + x1.max())
-
-    def predicted(*, elongation: object, speed: object, secant: bool = False) -> float:
-        return stability_limit(
-            case.body,
-            integrator,
-            elongation=elongation,
-            speed=speed,
-            secant=secant,
-            w_out=case.w_out,
-        )
+def _row(config: Config, name: str, integrator: str, motion: KnownMotion) -> Row:
+    case = CASES[name](config.seed)
+    body = case.body
+    x1, x2 = amplitudes_of(body, motion)
+    reach = OVERSHOOT * (np.ptp(body.positions, axis=0).max() + x1.max())
+    lengths = spring_lengths(body.positions, body.springs)
+    resolved = min(LONGEST, float(lengths.mean() / 2 / x2.max()))
 
     def stable(step: float) -> bool:
         wanted = math.ceil(config.duration / step)
         steps = min(config.most_steps, max(LEAST_STEPS, wanted))
         return is_stable(case, integrator, step, steps, reach)
 
-    blow_up = predicted(elongation=x1, speed=x2, secant=True)
+    samples = CLOSED_SAMPLES if case.w_out is not None else SAMPLES
+    low, high = step_bracket(body, integrator, motion.thinned(samples), w_out=case.w_out)
     return Row(
         name,
         integrator,
-        measured=bisect(stable, min(blow_up, 0.01), config.precision),
-        at_rest=predicted(elongation=0.0, speed=0.0),
-        safe=predicted(elongation=x1, speed=x2),
-        blow_up=blow_up,
+        measured=bisect(stable, min(low, resolved), config.precision, resolved),
+        at_rest=stability_limit(body, integrator, w_out=case.w_out),
+        low=low,
+        high=high,
+        resolved=resolved,
     )
 
 
-def bisect(stable: Callable[[float], bool], guess: float, precision: float) -> float:
-    """Largest stable step [s]: doubled or halved from a guess to a bracket, then bisected."""
+def bisect(
+    stable: Callable[[float], bool], guess: float, precision: float, longest: float = LONGEST
+) -> float:
+    """Largest stable step [s]: doubled or halved from a guess to a bracket, then bisected.
+
+    Args:
+        longest: that is tried [s]; infinity if it is stable.
+    """
     low = high = guess
     if stable(guess):
-        while stable(high := 2.0 * high):
-            low = high
-            if high >= LONGEST:
+        while True:
+            if high >= longest:
                 return math.inf
+            high = min(2.0 * high, longest)
+            if not stable(high):
+                break
+            low = high
     else:
         while not stable(low := 0.5 * low):
             high = low
@@ -95,29 +111,38 @@ def bisect(stable: Callable[[float], bool], guess: float, precision: float) -> f
 
 
 def is_stable(case: HardCase, integrator: str, step: float, steps: int, reach: float) -> bool:
-    """Whether a run stays finite and every spring within `reach` [m] of its rest length."""
-    with np.errstate(over="ignore"):  # speeds of 1e200 m/s
-        lengths = or_lost(lambda: simulate(case, integrator, step, steps), np.inf)
-    return bool((np.abs(lengths - case.body.rest_lengths) <= reach).all())
+    """Whether a run stays finite and within `reach` [m], and small differences stay small."""
+    with np.errstate(all="ignore"):  # speeds of 1e200 m/s
+        pair = or_lost(lambda: simulate(case, integrator, step, steps, copies=2), None)
+        if pair is None:
+            return False
+        moved = np.abs(pair - case.body.rest_lengths).max(axis=(0, 2))
+        apart = np.abs(pair[1] - pair[0]).max(axis=1)
+        most = np.maximum.accumulate(np.abs(pair[0] - pair[0, 0]).max(axis=1))
+    return bool((moved <= reach).all() and (apart <= GROWTH * NUDGE * most + ROUNDING).all())
 
 
-def simulate(case: HardCase, integrator: str, step: float, steps: int) -> Array:
-    """Lengths (T, L) [m] of a run in MuJoCo; says nothing of steps known to be too long.
+def simulate(case: HardCase, integrator: str, step: float, steps: int, copies: int = 1) -> Array:
+    """Lengths (copies, T, L) [m] of runs in MuJoCo, each pushed by NUDGE more than the one before.
+
+    Says nothing of steps known to be too long.
 
     Raises:
         DivergenceError: it blew up.
     """
+    body, shares = case.body, 1.0 + NUDGE * np.arange(copies)[:, None, None]
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", StabilityWarning)
-        simulation = Simulation(case.body, w_out=case.w_out, timestep=step, integrator=integrator)
-    simulation.set_state(velocities=case.velocities)
-    return simulation.rollout(steps, forces=case.forces, record=("lengths",)).get("lengths")
+        ensemble = Ensemble(
+            body, copies=copies, w_out=case.w_out, timestep=step, integrator=integrator
+        )
+    ensemble.set_state(velocities=shares * case.velocities)
+    forces = np.broadcast_to(shares * case.forces, (copies, steps, body.n_nodes))
+    return ensemble.rollout(steps, forces=forces, record=("lengths",)).get("lengths")
 
 
-def exact_amplitudes(case: HardCase, duration: float) -> tuple[Array, Array]:
-    """Largest |x1| [m] and |x2| [m/s] of each spring (L,) in the motion, by implicit Radau.
-
-    With continuous feedback, as Eq. (6) is written.
+def exact_motion(case: HardCase, duration: float) -> KnownMotion:
+    """The motion at implicit Radau's own steps, with continuous feedback, as Eq. (6) is written.
 
     Raises:
         DivergenceError: Radau fails, or the body itself blows up.
@@ -137,7 +162,11 @@ def exact_amplitudes(case: HardCase, duration: float) -> tuple[Array, Array]:
     if not solution.success:
         raise DivergenceError(f"Radau: {solution.message}", float(solution.t[-1]), 0)
     states = solution.y.T.reshape(-1, 2, body.n_nodes, 2)
-    gaps = states[:, :, body.springs[:, 1]] - states[:, :, body.springs[:, 0]]
-    lengths = np.linalg.norm(gaps[:, 0], axis=-1)
-    rates = (gaps[:, 0] * gaps[:, 1]).sum(axis=-1) / np.maximum(lengths, np.finfo(float).tiny)
-    return np.abs(lengths - body.rest_lengths).max(axis=0), np.abs(rates).max(axis=0)
+    return KnownMotion(solution.t, states[:, 0], states[:, 1])
+
+
+def amplitudes_of(body: Body, motion: KnownMotion) -> tuple[Array, Array]:
+    """Largest |x1| [m] and |x2| [m/s] of each spring (L,) in a motion."""
+    lengths = np.stack([spring_lengths(where, body.springs) for where in motion.positions])
+    largest = np.abs(lengths - body.rest_lengths).max(axis=0)
+    return largest, np.abs(motion.rates(body)).max(axis=0)
