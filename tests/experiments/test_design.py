@@ -152,6 +152,23 @@ def test_bad_configs():
         Config(parts=("smallest",), sizes=(2,))
 
 
+@pytest.mark.parametrize(("nodes", "most"), [(3, 0.05), (10, 0.01)])
+def test_the_designed_bodies_that_come_along_run_from_rest_and_learn_anew(nodes, most):
+    stored = open_body(f"designed_van_der_pol_{nodes}")
+    assert stored.body.n_nodes == nodes
+    assert (
+        stored.body.springs
+        == mcmj.random_body(stored.provenance["body"]["seed"], nodes=nodes).springs
+    ).all()
+    sim = mcmj.Simulation(stored.body, engine="twin", w_out=stored.w_out)
+    for seed in (None, 5):  # the file's readout, then one of another noise
+        if seed is not None:
+            mcmj.teach(sim, GOAL, Teaching(), seed=seed)
+        sim.reset()
+        sim.rollout(60_000, record=())
+        assert orbit_error(sim.rollout(20_000).outputs, GOAL) < most
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(("task", "nodes", "seed"), [("van_der_pol", 10, 0), ("lissajous", 15, 0)])
 def test_a_body_that_failed_is_designed_and_confirmed_from_outside(task, nodes, seed, tmp_path):
