@@ -1,49 +1,70 @@
-"""One number steers a robot: it enters the trunk as forces, and the readout stays as it is.
+"""One number steers a robot: it is added to the muscles' commands, and the readout stays as it is.
 
-What is taught depends on the input u, of which the readout knows only by what the forces do to
-the springs (trunk.TrunkSettings.steer):
+    command of muscle j = readout of the lengths + b_j u
 
-    turn    the feet go along circles, curvature 0.4 u [1/m] to the left
-    speed   strides are 0.8 + 0.4 u of the swing of the settings
-
-besides the curvature with which the robot walks straight ahead.
+b is the change of length that moves the feet, at u = 1, by so much: for "turn", fore feet to the
+right, hind feet to the left, all a little to the right, and left feet up, which turns every gait to
+the left; for "brake", all feet ahead, which slows it down. The gait that is taught does not depend
+on u, but is taught under many u, or they would throw the loop out of its rhythm.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
 from mcmj.metrics import orbits
-from mcmj.robots.trunk import Trunk, muscle_target
+from mcmj.robots.trunk import Trunk, changes_of_length, muscle_target
 from mcmj.robots.trunk_walker import SAMPLE, has_fallen, new_robot, poses, stand, walk
 from mcmj.robots.walk_metrics import Walk, headings, joined
 from mcmj.simulation.reservoir import Reservoir
 from mcmj.targets.limit_cycles import Target
 from mcmj.utils.errors import DivergenceError
 from mcmj.utils.seeds import stream
-from mcmj.utils.validation import Array
+from mcmj.utils.validation import Array, require_names
 
-LEVELS = (-1.0, 0.0, 1.0)  # of u, whose cycles are known; between them they are interpolated
-RAMP = 0.5  # s, from one value of u to the next
+# at u = 1 [m]: feet fore and hind apart, all to the right, left and right up and down; all ahead
+TURN, BRAKE = (0.03, 0.015, 0.012), 0.1
+LOWEST = {"turn": -1.0, "brake": 0.0}  # of u, by what it does; the largest is 1
+RAMP = 0.5  # s, from one value of u to the next, and in which a teacher begins
 TELL = 0.1  # s, between an operator's commands
 # how a way is straightened: short walks [s], so many; turning over curvature, as a first guess
 # [deg m/s]; the largest curvature [1/m]
 WALK, WALKS, SLOPE, STEEPEST = 6.0, 4, 60.0, 0.5
 
 
-def steered_target(
-    trunk: Trunk, gait: str, pace: float, steer: str, u: float, straight: float
-) -> Target:
-    """The muscles' changes of length at an input.
+def steering_bias(trunk: Trunk, steer: str) -> Array:
+    """b (n_muscles,) [m], of a robot in space.
 
-    Args:
-        straight: the curvature with which the robot walks straight ahead [1/m].
+    Raises:
+        UnknownNameError: neither "turn" nor "brake".
     """
-    if steer == "speed":
-        return muscle_target(trunk, gait, pace, stride=0.8 + 0.4 * u, curvature=straight)
-    return muscle_target(trunk, gait, pace, curvature=straight + 0.4 * u)
+    require_names("steer", (steer,), LOWEST)
+    ahead, left = np.sign((trunk.feet - trunk.feet.mean(axis=0))[:, :2].T)
+    moved = np.zeros((1, *trunk.feet.shape))
+    if steer == "turn":
+        moved[0, :, 1] = -TURN[0] * ahead - TURN[1]
+        moved[0, :, 2] = TURN[2] * left
+    else:
+        moved[0, :, 0] = BRAKE
+    return changes_of_length(trunk, moved)[0]
+
+
+def course_of_inputs(steer: str, seed: int, hold: float) -> Callable[[Array], Array]:
+    """Random u (T, 1) at times (T,) [s], each held for so long [s], to learn from.
+
+    Every third is at an end, where else hardly any is.
+    """
+    low = LOWEST[steer]
+    values = stream(seed, "task_inputs").uniform(low, 1.0, 4096)
+    values[::3] = np.where(values[::3] < (low + 1.0) / 2, low, 1.0)
+
+    def course(times: Array) -> Array:
+        which = (times / hold).astype(int) % len(values)
+        share = np.minimum(1.0, np.mod(times, hold) / RAMP)
+        found: Array = values[which - 1] + share * (values[which] - values[which - 1])
+        return found[:, None]
+
+    return course
 
 
 def straight_curvature(trunk: Trunk, gait: str, pace: float) -> float:
@@ -78,72 +99,8 @@ def _turning(robot: Reservoir, trunk: Trunk, target: Target) -> float:
     return float(np.degrees(heading[-1] - heading[0])) / (SAMPLE * (len(heading) - 1))
 
 
-@dataclass(frozen=True)
-class Steered:
-    """A gait that an input changes, and a course of random values of it to learn from.
-
-    Attributes:
-        cycles: by u, those of LEVELS.
-        target: what is taught along the course, periodic as the course is.
-        inputs: u (T, 1) along the course at times (T,) [s].
-    """
-
-    cycles: dict[float, Target]
-    target: Target
-    inputs: Callable[[Array], Array]
-
-    def cycle(self, u: float) -> Target:
-        """The cycle at a constant u."""
-        first = self.cycles[LEVELS[0]]
-        return Target(first.name, first.period, lambda times: _between(self.cycles, times, u))
-
-
-def steered_gait(
-    trunk: Trunk,
-    gait: str,
-    pace: float,
-    straight: float,
-    seed: int,
-    *,
-    duration: float,
-    hold: float,
-) -> Steered:
-    """A gait and a course for a robot that has an input.
-
-    Args:
-        straight: the curvature with which it walks straight ahead [1/m].
-        seed: of the course.
-        duration, hold: of the course, and of each value in it [s], in whole strides.
-    """
-    steer = trunk.settings.steer
-    cycles = {u: steered_target(trunk, gait, pace, steer, u, straight) for u in LEVELS}
-    period = cycles[0.0].period
-    hold = period * max(1, round(hold / period))
-    values = stream(seed, "task_inputs").uniform(-1.0, 1.0, max(2, round(duration / hold)))
-    values[::3] = np.sign(values[::3])  # the ends, which a uniform course hardly sees
-    starts = hold * np.arange(len(values) + 1)
-
-    def course(times: Array) -> Array:
-        at = np.mod(times, starts[-1])
-        which = np.minimum((at / hold).astype(int), len(values) - 1)
-        share = np.minimum(1.0, (at - starts[which]) / RAMP)
-        found: Array = values[which - 1] + share * (values[which] - values[which - 1])
-        return found
-
-    target = Target(gait, float(starts[-1]), lambda t: _between(cycles, t, course(np.asarray(t))))
-    return Steered(cycles, target, lambda times: course(times)[:, None])
-
-
-def _between(cycles: dict[float, Target], times: Array, u: npt.ArrayLike) -> Array:
-    """Linear in u between the levels (T, n_outputs)."""
-    low, middle, high = (cycles[level].sample(times) for level in LEVELS)
-    share = np.broadcast_to(u, np.shape(times))[:, None]
-    found: Array = middle + np.where(share > 0, share * (high - middle), -share * (low - middle))
-    return found
-
-
 def steered_error(
-    robot: Reservoir, trunk: Trunk, steered: Steered, values: Sequence[float], duration: float
+    robot: Reservoir, trunk: Trunk, target: Target, values: Sequence[float], duration: float
 ) -> float:
     """Mean orbit error of a free run at constant inputs, one after the other; inf if it falls."""
     failed, errors, steps = has_fallen(trunk), [], round(duration / robot.timestep)
@@ -152,7 +109,7 @@ def steered_error(
             run = robot.rollout(steps, np.full((steps, 1), u), record=("outputs", "qpos"))
             if failed(run):
                 return np.inf
-            errors.append(orbits.orbit_error(run.get("outputs")[steps // 2 :], steered.cycle(u)))
+            errors.append(orbits.orbit_error(run.get("outputs")[steps // 2 :], target))
     except DivergenceError:
         return np.inf
     return float(np.mean(errors))

@@ -26,7 +26,6 @@ from mcmj.utils.seeds import stream
 from mcmj.utils.validation import (
     Array,
     require_count,
-    require_names,
     require_number,
     require_range,
 )
@@ -35,9 +34,6 @@ _FLAT_HIPS = ((0, 1), (1, 2), (3, 4), (4, 5))  # a leg's fore and rear node, alo
 _APART = 0.01  # m, of left and right feet from the middle, or two nodes would be in one place
 CANDIDATES, _LOW = 20, 0.4  # in space: for each node; their lowest place, over the height
 _INNER = 0.2  # place of the inner hips, over half the depth
-
-
-STEERS = {"turn": 1, "speed": 0}  # the axis of the forces
 
 
 @dataclass(frozen=True)
@@ -64,10 +60,6 @@ class TrunkSettings:
         swing: amplitude of a foot's way, forth and back [m].
         lift: of a foot in the middle of its swing [m].
         lags: of the lift behind the swing, over a period, in the order of mcmj.targets.gaits.GAITS.
-        steer: what an input of the robot does, in space: "turn", forces from side to side that
-            bend the trunk, or "speed", forces along it that stretch it; "": there is none. They
-            have no resultant and no moment.
-        steer_force: their sizes at an input of 1, summed over the nodes [N].
 
     Raises:
         InvalidArgumentError: a number or range out of bounds.
@@ -94,13 +86,9 @@ class TrunkSettings:
     swing: float = 0.1
     lift: float = 0.07
     lags: tuple[float, ...] = (0.0,) * len(GAITS)
-    steer: str = ""
-    steer_force: float = 120.0
 
     def __post_init__(self) -> None:
         require_count("nodes", self.nodes, 1 + len(_hips(self)[0]), MOST_NODES)
-        if self.steer:
-            require_names("steer", (self.steer,), STEERS)
         if len(self.lags) != len(GAITS):
             raise InvalidArgumentError("lags", f"{len(GAITS)} numbers", self.lags)
         for lag in self.lags:
@@ -110,7 +98,7 @@ class TrunkSettings:
                 require_range(field.name, getattr(self, field.name))
             elif field.name == "depth":
                 require_number("depth", self.depth, 0.0)
-            elif field.name not in ("nodes", "steer", "lags"):
+            elif field.name not in ("nodes", "lags"):
                 require_number(field.name, getattr(self, field.name), 0.0, open_low=True)
         if 4 * self.hip >= self.width and not self.depth:
             raise InvalidArgumentError("hip", f"less than width / 4 = {self.width / 4}", self.hip)
@@ -132,6 +120,12 @@ class Trunk:
     def n_muscles(self) -> int:
         """Two a leg, in space three."""
         return len(LEGS) * self.body.dimensions
+
+    @property
+    def feet(self) -> Array:
+        """Where they are drawn (n_legs, D) [m]."""
+        found: Array = self.body.positions[self.settings.nodes :]
+        return found
 
     @property
     def n_sensed(self) -> int:
@@ -179,27 +173,8 @@ def draw_trunk(seed: int, settings: TrunkSettings | None = None) -> Trunk:
         fixed=np.zeros(n + len(LEGS), dtype=np.bool_),
         masses=np.r_[np.full(n, settings.mass / n), np.full(len(LEGS), settings.foot_mass)],
         **parameters,
-        **_input(settings, trunk),
     )
     return Trunk(body, settings)
-
-
-def _input(settings: TrunkSettings, trunk: Array) -> dict[str, Array]:
-    """What of a body is its input: weights (nodes, 1) and direction; nothing without one.
-
-    Along x they are those of the place from end to end, along y of its square, less what would
-    push or turn the whole trunk: a constant, and the places at right angles to them.
-    """
-    if not settings.steer:
-        return {}
-    axis = STEERS[settings.steer]
-    x = trunk[:, 0] - trunk[:, 0].mean()
-    bend = x if axis == 0 else x**2
-    whole = np.column_stack([np.ones(len(x)), np.delete(trunk, axis, axis=1)])
-    bend -= whole @ np.linalg.lstsq(whole, bend, rcond=None)[0]
-    weights = np.zeros((len(trunk) + len(LEGS), 1))
-    weights[: len(trunk), 0] = settings.steer_force * bend / np.abs(bend).sum()
-    return {"w_in": weights, "direction": np.eye(3)[axis]}
 
 
 def _hips(settings: TrunkSettings) -> tuple[Array, tuple[tuple[int, ...], ...]]:
@@ -250,15 +225,22 @@ def muscle_lengths(
     """
     x, z = np.asarray(swing, dtype=np.float64), np.asarray(lift, dtype=np.float64)
     body, settings = trunk.body, trunk.settings
-    muscles, feet = body.springs[trunk.n_sensed :], body.positions[settings.nodes :]
+    feet = trunk.feet
     moved = np.zeros((len(x), len(LEGS), body.dimensions))
     moved[..., 0], moved[..., -1] = settings.swing * x, settings.lift * z
     if body.dimensions == 3:
         ahead, left = (feet - feet.mean(axis=0))[:, :2].T
         moved[..., 1] = curvature * ahead * moved[..., 0]
         moved[..., 0] *= 1.0 - curvature * left
-    moved = np.repeat(moved, body.dimensions, axis=1)  # as many muscles a leg
-    legs = body.positions[muscles[:, 1]] + moved - body.positions[muscles[:, 0]]
+    return changes_of_length(trunk, moved)
+
+
+def changes_of_length(trunk: Trunk, moved: Array) -> Array:
+    """Changes c (T, n_muscles) [m] that move the feet by so much (T, n_legs, D) [m], unloaded."""
+    body = trunk.body
+    muscles = body.springs[trunk.n_sensed :]
+    each = np.repeat(moved, body.dimensions, axis=1)  # as many muscles a leg
+    legs = body.positions[muscles[:, 1]] + each - body.positions[muscles[:, 0]]
     found: Array = np.linalg.norm(legs, axis=-1) - body.rest_lengths[trunk.n_sensed :]
     return found
 

@@ -44,6 +44,7 @@ def new_robot(
     ground: bool = True,
     slope: float = 0.0,
     step: float = 0.0,
+    bias: Array | None = None,
 ) -> Reservoir:
     """A robot as a reservoir.
 
@@ -53,6 +54,9 @@ def new_robot(
         ground: without it the robot falls freely.
         slope: of the ground, upwards ahead [rad].
         step: height of bars across the way, one in every other STEP_LENGTH [m]; in space.
+
+        bias: (n_muscles,) what the robot's one input adds to the muscles' commands at 1 [m];
+            default: there is no input.
 
     Raises:
         InvalidArgumentError, UnknownNameError: an argument out of bounds.
@@ -69,7 +73,7 @@ def new_robot(
         spec,
         sensors=[f"length{i}" for i in range(trunk.n_sensed)],
         channels="m*",
-        inputs="in*" if trunk.body.n_inputs else (),
+        inputs=() if bias is None else {"u": {f"m{j}": float(b) for j, b in enumerate(bias)}},
     )
 
 

@@ -310,7 +310,7 @@ def test_all_parts_of_soft_robot(tmp_path):
     """Every part says something of every gait; seconds of learning are too few for more."""
     options = ["--gaits", "trot", "bound", "--no-video", "--walking", "4", "--judged", "2"]
     options += ["--rounds", "1", "--round-duration", "6", "--trial", "3", "--survive", "1.5"]
-    options += ["--teaching", "5", "--pushes", "1", "--impulses", "10", "--steering", "6", "1"]
+    options += ["--teaching", "5", "--pushes", "1", "--impulses", "10"]
     status, _, err = run("soft_robot", *options, "--steps-ms", "0.2", "--out", tmp_path)
     assert status == 0, err
     metrics = metrics_of(tmp_path)["metrics"]

@@ -1,7 +1,5 @@
 """A soft robot in space: its mechanics against symmetry, conservation and geometry."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from scipy.optimize import least_squares
@@ -11,7 +9,7 @@ from mcmj.core.body import Body
 from mcmj.experiments.soft_robot.config import SPATIAL
 from mcmj.robots.energy import energy_balance
 from mcmj.robots.quadruped import GRAVITY
-from mcmj.robots.steering import LEVELS, PointFollower, steered_gait, steered_target
+from mcmj.robots.steering import PointFollower, course_of_inputs, steering_bias
 from mcmj.robots.trunk import Trunk, draw_trunk, muscle_lengths, muscle_target
 from mcmj.robots.trunk_walker import heading_ahead, new_robot, poses, stand, walk
 from mcmj.robots.walk_metrics import headings
@@ -156,16 +154,6 @@ def test_the_energy_balance_closes_and_the_better_the_smaller_the_step(trunk):
     assert errors[1] < 0.6 * errors[0]
 
 
-@pytest.mark.parametrize("steer", ["turn", "speed"])
-def test_an_inputs_forces_have_no_resultant_and_no_moment(steer):
-    body = draw_trunk(4, replace(SPATIAL, steer=steer)).body
-    forces = body.w_in * body.direction
-    assert np.abs(forces).sum() == pytest.approx(SPATIAL.steer_force)
-    assert np.abs(forces.sum(axis=0)).max() < 1e-11
-    assert np.abs(np.cross(body.positions, forces).sum(axis=0)).max() < 1e-11
-    assert (body.w_in[-len(LEGS) :] == 0).all()
-
-
 def test_feet_go_along_circles_about_the_centre_of_the_way(trunk):
     """Seen from the centre, a foot's way is at right angles to its place, and as long as that."""
     curvature, small = 0.4, 1e-6
@@ -184,20 +172,30 @@ def test_feet_go_along_circles_about_the_centre_of_the_way(trunk):
         assert way == pytest.approx(circle, abs=1e-6)
 
 
-@pytest.mark.parametrize("steer", ["turn", "speed"])
-def test_what_is_taught_along_the_course_is_the_cycle_of_the_input(steer):
-    trunk = draw_trunk(4, replace(SPATIAL, steer=steer))
-    steered = steered_gait(trunk, "trot", 16.0, 0.1, 0, duration=20.0, hold=2.0)
-    times = np.arange(0.0, 20.0, 0.13)
-    told, taught = steered.inputs(times)[:, 0], steered.target.sample(times)
-    for time, u, row in zip(times, told, taught, strict=True):
-        assert row == pytest.approx(steered.cycle(float(u)).sample([time])[0], abs=1e-12)
-    for level in LEVELS:
-        exact = steered_target(trunk, "trot", 16.0, steer, level, 0.1)
-        assert np.array_equal(steered.cycle(level).orbit(64), exact.orbit(64))
-    halfway = steered_target(trunk, "trot", 16.0, steer, 0.5, 0.1).orbit(64)
-    assert np.abs(steered.cycle(0.5).orbit(64) - halfway).max() < 0.002  # m; nearly linear
-    assert np.ptp(told) > 1.0
+@pytest.mark.parametrize("steer", ["turn", "brake"])
+def test_an_input_adds_its_bias_to_the_commands(trunk, steer):
+    """As forces: those of a robot without input that is told the sum."""
+    bias, ends = steering_bias(trunk, steer), []
+    told = muscle_target(trunk, "trot", 16.0).sample(4e-4 * np.arange(500))
+    for robot, given in (
+        (new_robot(trunk, bias=bias), {"offset": told, "inputs": np.full((500, 1), 0.7)}),
+        (new_robot(trunk), {"offset": told + 0.7 * bias}),
+    ):
+        robot.rollout(gate=0.0, record=(), **given)
+        ends.append(robot.qpos)
+    assert np.abs(ends[0] - ends[1]).max() < 1e-9
+    assert np.abs(bias).max() > 0.004
+
+
+def test_a_course_of_inputs_has_all_values_and_does_not_jump():
+    times = np.arange(0.0, 400.0, 1e-3)
+    for steer, low in (("turn", -1.0), ("brake", 0.0)):
+        course = course_of_inputs(steer, 3, 2.0)(times)[:, 0]
+        assert course.min() == low
+        assert course.max() == 1.0
+        assert np.abs(np.diff(course)).max() < 1.01e-3 * (1.0 - low) / 0.5
+        counts = np.histogram(course, 10)[0]
+        assert counts.min() > len(times) / 30
 
 
 def test_under_a_teacher_it_turns_as_told():

@@ -70,7 +70,7 @@ def show(result: Result, console: Console) -> None:
     if "push" in table:
         most = ", ".join(f"{n} {v:g} N s" for n, v in table["push"]["by_gait_Ns"].items())
         console.print(f"pushes from the side, all survived: {most}")
-    for steer in ("steer", "speed"):
+    for steer in ("steer", "brake"):
         row = table.get(steer)
         if row is not None and not row["falls"]:
             name = "turns_deg_s" if steer == "steer" else "speeds_m_s"

@@ -1,13 +1,14 @@
 """What the experiment of the soft robot runs: its Config."""
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import ClassVar
 
 import numpy as np
 
 from mcmj.experiments.trunk import config as trunk
 from mcmj.learning.force_learning import ForceLearning
-from mcmj.robots.trunk import STEERS, TrunkSettings
+from mcmj.robots.steering import LOWEST
+from mcmj.robots.trunk import TrunkSettings
 from mcmj.robots.trunk_walker import STEPS
 from mcmj.targets.gaits import GAITS
 from mcmj.utils.errors import InvalidArgumentError
@@ -17,11 +18,11 @@ SPATIAL = TrunkSettings(
     height=0.4, depth=0.5, leg=0.38, hip=0.44, stance=0.5, mass=26.0,
     d1=(80.0, 720.0), d3=(250.0, 550.0), foot=0.03,
     muscle_stiffness=6570.0, muscle_damping=105.0, muscle_strength=600.0,
-    swing=0.076, lift=0.045, lags=(0.1, 0.14, 0.18, 0.22), steer_force=240.0,
+    swing=0.076, lift=0.045, lags=(0.1, 0.14, 0.18, 0.22),
 )  # fmt: skip
 PARTS = (
     "regression", "practice", "rest", "push", "switch", "steps", "energy", "controls", "ground",
-    "cut", "turn", "speed",
+    "cut", *LOWEST,
 )  # fmt: skip
 
 
@@ -38,7 +39,7 @@ class Config(trunk.Config):
             count falls; switch: of the readout while walking; steps: the same walk at other time
             steps; energy: where the work goes; controls: shuffled and frozen lengths, a tape in
             place of the loop; ground: slopes and steps; cut: springs, and learning again; turn,
-            speed: a robot that an input steers (turn: with a figure of eight).
+            brake: a robot that an input steers (turn: with a figure of eight).
         pace: of the gaits, as many times faster than mcmj.targets.gaits.
         walking: a walk of each gait after learning [s] ..
         judged: .. whose last part is measured [s].
@@ -50,7 +51,7 @@ class Config(trunk.Config):
         slopes, heights: of the ground, over 1, and of steps up and down in it [m].
         cut: share of the springs that are cut.
         steered: gait of the robots that an input steers ..
-        steering: .. how long they learn, and its values are held [s].
+        hold: .. how long its values are held while they learn [s].
         told: values of the input at which they are measured.
         points: radius of the figure of eight, and how near its points are to be passed [m].
         gain: of the operator who follows it, input per radian.
@@ -68,10 +69,10 @@ class Config(trunk.Config):
     slopes: tuple[float, ...] = (-0.05, -0.02, 0.02, 0.05)
     heights: tuple[float, ...] = (0.01, 0.02)
     cut: float = 0.1
-    steered: str = "walk"
-    steering: tuple[float, float] = (90.0, 2.0)
+    steered: str = "bound"
+    hold: float = 2.0
     told: tuple[float, ...] = (-1.0, -0.8, -0.4, 0.0, 0.4, 0.8, 1.0)
-    points: tuple[float, float] = (5.0, 0.5)
+    points: tuple[float, float] = (12.0, 1.0)
     gain: float = 2.0
     trunk: TrunkSettings = SPATIAL
     learning: ForceLearning = field(
@@ -84,10 +85,10 @@ class Config(trunk.Config):
         super().__post_init__()
         require_names("steered", (self.steered,), GAITS)
         require_number("cut", self.cut, 0.0, 0.5, open_low=True)
-        require_number("gain", self.gain, 0.0, open_low=True)
-        for name in ("steering", "points"):
-            for value in getattr(self, name):
-                require_number(name, value, 0.0, open_low=True)
+        for name in ("gain", "hold"):
+            require_number(name, getattr(self, name), 0.0, open_low=True)
+        for value in self.points:
+            require_number("points", value, 0.0, open_low=True)
         for height in self.heights:
             require_number("heights", height, 0.0, self.trunk.leg / 2)
         for slope in self.slopes:
@@ -97,16 +98,12 @@ class Config(trunk.Config):
         if not self.trunk.depth:
             raise InvalidArgumentError("depth", "above 0: in a plane there is mcmj trunk", 0.0)
 
-    def steered_trunk(self, steer: str) -> TrunkSettings:
-        """The settings of a robot that an input steers."""
-        return replace(self.trunk, steer=steer)
-
 
 def total_steps(config: Config) -> int:
     """Steps at most, for a progress bar."""
     learning, walking = config.learning, config.walking
     pushes = len(config.impulses) * 2 * config.pushes
-    steered = learning.warm_up + config.steering[0] + len(config.told) * config.judged
+    steered = learning.total + len(config.told) * config.judged
     parts = {
         "regression": learning.washout + config.teaching + walking,
         "practice": 3 * (config.teaching + walking),
@@ -118,7 +115,7 @@ def total_steps(config: Config) -> int:
         "controls": 3 * config.survive + pushes * config.survive,
         "ground": (len(config.slopes) + len(config.heights)) * config.judged,
         "cut": learning.total + 2 * walking,
-        **dict.fromkeys(STEERS, steered / len(config.gaits)),
+        **dict.fromkeys(LOWEST, steered / len(config.gaits)),
     }
     seconds = config.seeds * (learning.total + walking) + sum(parts[p] for p in config.parts)
     return round(float(np.ceil(len(config.gaits) * seconds / STEPS[3][1])))

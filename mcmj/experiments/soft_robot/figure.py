@@ -76,11 +76,15 @@ def steer_figure(result: Result) -> Figure:
     for panel, (steer, robot) in zip(axes, panels, strict=False):
         name, label = {
             "turn": ("turns_deg_s", "turning, left positive [deg/s]"),
-            "speed": ("speeds_m_s", "speed [m/s]"),
+            "brake": ("speeds_m_s", "speed [m/s]"),
         }[steer]
         panel.axhline(0, color="0.8", lw=1)
         panel.plot(robot.table["told"], robot.table[name], "o-", color=BLUE)
-        panel.set(xlabel="input u", ylabel=label, title=f"one number sets its {steer}")
+        panel.set(
+            xlabel="input u",
+            ylabel=label,
+            title={"turn": "one number turns it", "brake": "one number slows it"}[steer],
+        )
         panel.spines[["right", "top"]].set_visible(False)
     if path is not None:
         _draw_path(axes[-1], path)

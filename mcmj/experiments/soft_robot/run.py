@@ -8,7 +8,7 @@ from mcmj.experiments.soft_robot.result import Result, gait_table
 from mcmj.experiments.soft_robot.steer import SteeredRobot, learn_steered
 from mcmj.experiments.trunk.result import Table
 from mcmj.experiments.trunk.run import learn
-from mcmj.robots.trunk import STEERS
+from mcmj.robots.steering import LOWEST
 from mcmj.utils.progress import OnSteps
 from mcmj.utils.threads import in_threads
 
@@ -36,7 +36,7 @@ def run(config: Config, *, on_steps: OnSteps = lambda steps: None) -> Result:
 
 def _steer(config: Config, table: Table, on_steps: OnSteps) -> dict[str, SteeredRobot]:
     """By kind of input, the first robot; all are in the table."""
-    steers = [steer for steer in STEERS if steer in config.parts]
+    steers = [steer for steer in LOWEST if steer in config.parts]
     seeds = range(config.seed, config.seed + config.seeds)
     chosen = [(seed, steer) for steer in steers for seed in seeds]
     rows = in_threads(partial(learn_steered, config), chosen, on_steps)
@@ -57,7 +57,7 @@ def _ends(steer: str, table: Table) -> Table:
         turns: list[float] = table["turns_deg_s"]  # type: ignore[assignment]
         return {"left_deg_s": turns[-1], "right_deg_s": turns[0]}
     speeds: list[float] = table["speeds_m_s"]  # type: ignore[assignment]
-    return {"slow_m_s": speeds[0], "fast_m_s": speeds[-1]}
+    return {"fast_m_s": speeds[0], "slow_m_s": speeds[-1]}
 
 
 def _as_it_is(config: Config, rows: Table) -> Table:

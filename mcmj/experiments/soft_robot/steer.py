@@ -5,19 +5,21 @@ from functools import partial
 
 import numpy as np
 
+from mcmj.experiments.blow_ups import or_lost
 from mcmj.experiments.soft_robot.config import Config
 from mcmj.experiments.trunk.result import Table
 from mcmj.learning.force_learning import Learned, force_learn
 from mcmj.robots.steering import (
+    LOWEST,
     TELL,
     PointFollower,
-    Steered,
+    course_of_inputs,
     operate,
     steered_error,
-    steered_gait,
+    steering_bias,
     straight_curvature,
 )
-from mcmj.robots.trunk import Trunk, draw_trunk
+from mcmj.robots.trunk import Trunk, draw_trunk, muscle_target
 from mcmj.robots.trunk_walker import has_fallen, new_robot, poses, stand
 from mcmj.robots.walk_metrics import Walk, headings
 from mcmj.simulation.reservoir import Reservoir
@@ -25,9 +27,9 @@ from mcmj.utils.errors import DivergenceError
 from mcmj.utils.progress import OnSteps
 from mcmj.utils.validation import Array
 
-TRIED = (-0.8, 0.0, 0.8)  # inputs of a trial while learning
+TRIED = 3  # inputs of a trial while learning
 SETTLE = 2.0  # s after a change of the input that is not measured
-LONGEST = 150.0  # s, on a path
+LONGEST = 240.0  # s, on a path
 
 
 @dataclass(frozen=True)
@@ -44,7 +46,7 @@ class SteeredRobot:
     """What has been learned, and how it followed a path; None: it fell, or there was none."""
 
     trunk: Trunk
-    steered: Steered
+    steer: str
     learned: Learned | None
     table: Table
     path: Path | None = None
@@ -52,50 +54,49 @@ class SteeredRobot:
     def robot(self) -> Reservoir:
         """Walking, at the end of its learning."""
         assert self.learned is not None
-        robot = new_robot(self.trunk)
+        robot = new_robot(self.trunk, bias=steering_bias(self.trunk, self.steer))
         robot.set_readout(self.learned.w_out)
         robot.restore(self.learned.state)
         return robot
 
 
 def learn_steered(config: Config, chosen: tuple[int, str], on_steps: OnSteps) -> SteeredRobot:
-    """One robot, by its seed, learns to be steered, by "turn" or "speed", and is measured."""
+    """One robot, by its seed, learns under inputs that "turn" or "brake" it, and is measured."""
     seed, steer = chosen
-    trunk = draw_trunk(seed, config.steered_trunk(steer))
-    duration, hold = config.steering
+    trunk = draw_trunk(seed, config.trunk)
     straight = straight_curvature(trunk, config.steered, config.pace)
-    steered = steered_gait(
-        trunk, config.steered, config.pace, straight, seed, duration=duration, hold=hold
-    )
-    robot = new_robot(trunk)
-    led = config.learning.washout + duration / 3  # the teacher shows many inputs first
-    learning = replace(config.learning, warm_up=led, rounds=2, round_duration=duration / 3)
-    try:
-        learned = force_learn(
-            robot, steered.target, learning, seed=seed, stand=lambda: stand(robot),
-            inputs=steered.inputs,
-            judge=partial(
-                steered_error, robot, trunk, steered, TRIED, learning.trial / len(TRIED)
-            ),
-            on_steps=on_steps,
-        )  # fmt: skip
-    except DivergenceError:
-        return SteeredRobot(trunk, steered, None, {"falls": 1})
-    found = SteeredRobot(trunk, steered, learned, {})
+    target = muscle_target(trunk, config.steered, config.pace, curvature=straight)
+    robot = new_robot(trunk, bias=steering_bias(trunk, steer))
+    tried = np.linspace(LOWEST[steer], 1.0, TRIED)
+    judge = partial(steered_error, robot, trunk, target, tried, config.learning.trial / 2)
+    learned = or_lost(
+        lambda: force_learn(
+            robot, target, config.learning, seed=seed, stand=lambda: stand(robot),
+            inputs=course_of_inputs(steer, seed, config.hold), judge=judge, on_steps=on_steps,
+        ),
+        None,
+    )  # fmt: skip
+    found = SteeredRobot(trunk, steer, learned, {"falls": 1})
+    return found if learned is None else _measured(config, found, on_steps)
+
+
+def _measured(config: Config, found: SteeredRobot, on_steps: OnSteps) -> SteeredRobot:
+    """With its table, and with the path if it can turn."""
     table = told(config, found, on_steps)
-    if steer == "turn" and not table["falls"]:
-        straight = float(np.interp(0.0, *_by_turn(table)))
-        path = follow(config, found, straight)
-        return replace(found, table=table | _path_table(config, path), path=path)
+    if found.steer == "turn" and not table["falls"]:
+        path = or_lost(lambda: follow(config, found, float(np.interp(0.0, *_by_turn(table)))), None)
+        if path is not None:
+            return replace(found, table=table | _path_table(config, path), path=path)
     return replace(found, table=table)
 
 
 def told(config: Config, found: SteeredRobot, on_steps: OnSteps) -> Table:
     """Speed and turning at constant inputs, one after the other in one walk."""
     robot, trunk, failed = found.robot(), found.trunk, has_fallen(found.trunk)
-    rows: Table = {"falls": 0, "told": list(config.told), "speeds_m_s": [], "turns_deg_s": []}
+    inputs = [u for u in config.told if u >= LOWEST[found.steer]]
+    rows: Table = {"falls": 0, "told": inputs, "speeds_m_s": [], "turns_deg_s": []}
     settle, steps = (round(time / robot.timestep) for time in (SETTLE, config.judged / 2))
-    for u in config.told:
+    for u in inputs:
         given = np.full((settle + steps, 1), u)
         try:
             run = robot.rollout(inputs=given, record=("qpos",))
