@@ -169,7 +169,7 @@ SWING = swing_up.Config(
 def test_swing_up_starts_from_total_rest_and_is_measured_as_said():
     (tasks,) = swing_up.run(SWING).bodies
     run = tasks["quadratic"]
-    body, _, _ = swing_up.limit_cycle.get_body(SWING.of_seed(0))
+    body, *_ = swing_up.limit_cycle.get_body(SWING.of_seed(0))
     taught = Simulation(body, engine="twin")
     course = Course(taught, SWING.teaching, 0)
     course.attend_all(lessons_of(run.target, SWING.teaching))
