@@ -46,7 +46,7 @@ class Integrator:
 
 _ROWS = (
     Integrator("Euler", "Euler", twin="semi_implicit_euler"),
-    Integrator("RK4", "RK4", twin="rk4", order=4, stages=4, grace=0.2),
+    Integrator("RK4", "RK4", twin="rk4", order=4, stages=4, grace=0.22),
     Integrator("implicit", "implicit", implicit=True, advised=False),
     Integrator("implicitfast", "implicitfast", implicit=True, advised=False),
     Integrator("discrete", "discrete", implicit=True),

@@ -16,6 +16,7 @@ from mcmj.experiments.hard_cases.run import (
     amplitudes_of,
     bisect,
     exact_motion,
+    noise,
     run,
     simulate,
 )
@@ -214,6 +215,15 @@ def test_bisection():
     assert bisect(lambda h: h <= 0.3, 0.01, 0.01, 0.2) == math.inf
     assert bisect(lambda h: True, 0.01, 0.01) == math.inf
     assert bisect(lambda h: False, 0.01, 0.01) == 0.0
+
+
+def test_noise_is_what_turns_at_every_step():
+    steps = np.arange(200)[:, None]
+    smooth = 1.0 + 0.1 * np.sin(0.05 * steps)
+    flicker = 1e-3 * (-1.0) ** steps
+    assert noise(smooth) < 1e-5
+    assert noise(smooth + flicker) == pytest.approx(1e-3, rel=0.02)
+    assert noise(smooth + flicker * (steps < 8)) < 1e-5  # over at once
 
 
 def test_experiment():

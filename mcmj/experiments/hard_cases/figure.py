@@ -26,13 +26,13 @@ def step_figure(result: Result) -> Figure:
         found = [row for row in result.rows if row.integrator == integrator]
         steps = np.array([[getattr(row, name) for row in found] for name in STEPS])
         measured, at_rest, low, high = np.minimum(steps[:4], np.minimum(steps[4], TOP))
-        panel.hlines(rows, low, high, color=BLUE, alpha=0.35, lw=6,
+        panel.hlines(rows, low, high, color=BLUE, alpha=0.45, lw=9,
                      label="predicted along the motion")  # fmt: skip
         panel.plot(steps[4], rows, "|", color=GREY, ms=11, mew=1,
                    label="longest that resolves the motion")  # fmt: skip
         panel.plot(at_rest, rows, "|", color=GREEN, ms=11, mew=2,
                    label="predicted at rest")  # fmt: skip
-        panel.plot(measured, rows, "o", color=BLACK, ms=4, label="measured")
+        panel.plot(measured, rows, "o", color=BLACK, ms=3, label="measured")
         panel.axvline(PLAIN_STEP, color=TARGET_COLOUR, ls="--", lw=1, label="1 ms")
         panel.set(xscale="log", title=integrator, xlim=(1e-8, 1.6 * TOP))
         panel.set_xticks([1e-7, 1e-5, 1e-3, 1e-1])

@@ -2,9 +2,9 @@
 
 Each case is a body with a start that some integrator cannot bear at 1 ms. A step is stable
 here if the run stays finite, no spring gets further from its rest length than OVERSHOOT
-times the body and the exact motion, and a run whose forces and velocities at the start are larger
-by the share NUDGE moves no spring away by more than GROWTH times that share of what it moves at
-most. So a run that survives as noise is not stable; a stable one may still be inaccurate. No step
+times the body and the exact motion, and no length oscillates from step to step for ALTERNATIONS
+steps by more than NOISE of the largest motion: cubic dampers bound that oscillation, so that a run
+may survive as noise, which is not stable. A stable run may still be inaccurate. No step
 is tried in which the motion is not resolved: in which the fastest change of a length would be half
 the mean length of a spring.
 
@@ -17,6 +17,7 @@ import warnings
 from collections.abc import Callable
 
 import numpy as np
+import numpy.typing as npt
 from scipy.integrate import solve_ivp
 
 from mcmj.core.body import Body, spring_lengths
@@ -26,7 +27,7 @@ from mcmj.experiments.hard_cases.bodies import CASES, HardCase
 from mcmj.experiments.hard_cases.config import Config
 from mcmj.experiments.hard_cases.result import Result, Row
 from mcmj.reference.dop853 import accelerations
-from mcmj.simulation.ensemble import Ensemble
+from mcmj.simulation.simulation import Simulation
 from mcmj.simulation.stepsize.along_motion import KnownMotion, step_bracket
 from mcmj.simulation.stepsize.limit import stability_limit
 from mcmj.utils.errors import DivergenceError, StabilityWarning
@@ -34,9 +35,8 @@ from mcmj.utils.progress import OnSteps
 from mcmj.utils.validation import Array
 
 OVERSHOOT = 10.0
-NUDGE = 1e-8
-GROWTH = 2.0
-ROUNDING = 1e-13  # m: of lengths of a metre, many steps
+NOISE = 1e-4  # of the largest motion
+ALTERNATIONS = 12
 SAMPLES, CLOSED_SAMPLES = 90, 30  # of the exact motion; a closed loop's limits take long
 LEAST_STEPS = 400  # of a run: time for a slow growth
 LONGEST = 1.0  # s: no longer step is tried
@@ -111,34 +111,39 @@ def bisect(
 
 
 def is_stable(case: HardCase, integrator: str, step: float, steps: int, reach: float) -> bool:
-    """Whether a run stays finite and within `reach` [m], and small differences stay small."""
+    """Whether a run stays finite, every spring within `reach` [m], and all smooth."""
     with np.errstate(all="ignore"):  # speeds of 1e200 m/s
-        pair = or_lost(lambda: simulate(case, integrator, step, steps, copies=2), None)
-        if pair is None:
+        lengths = or_lost(lambda: simulate(case, integrator, step, steps), None)
+        if lengths is None or not (np.abs(lengths - case.body.rest_lengths) <= reach).all():
             return False
-        moved = np.abs(pair - case.body.rest_lengths).max(axis=(0, 2))
-        apart = np.abs(pair[1] - pair[0]).max(axis=1)
-        most = np.maximum.accumulate(np.abs(pair[0] - pair[0, 0]).max(axis=1))
-    return bool((moved <= reach).all() and (apart <= GROWTH * NUDGE * most + ROUNDING).all())
+    return noise(lengths) <= NOISE * float(np.abs(lengths - lengths[0]).max())
 
 
-def simulate(case: HardCase, integrator: str, step: float, steps: int, copies: int = 1) -> Array:
-    """Lengths (copies, T, L) [m] of runs in MuJoCo, each pushed by NUDGE more than the one before.
+def noise(lengths: Array) -> float:
+    """Largest amplitude [m] in lengths (T, L) of an oscillation (-1)^k u over ALTERNATIONS steps.
 
-    Says nothing of steps known to be too long.
+    One that falls below half in these steps dies away, and is none. Its third difference is
+    -8 (-1)^k u, that of a smooth motion of third order in the step.
+    """
+    changes = np.diff(lengths, n=3, axis=0) / 8
+    turns = np.cumsum(changes[1:] * changes[:-1] < 0, axis=0)
+    lasting: npt.NDArray[np.bool_] = turns[ALTERNATIONS:] - turns[:-ALTERNATIONS] == ALTERNATIONS
+    sizes = np.abs(changes)
+    before, after = sizes[1:-ALTERNATIONS], sizes[ALTERNATIONS + 1 :]
+    return float((after * (lasting & (after > before / 2))).max(initial=0.0))
+
+
+def simulate(case: HardCase, integrator: str, step: float, steps: int) -> Array:
+    """Lengths (T, L) [m] of a run in MuJoCo; says nothing of steps known to be too long.
 
     Raises:
         DivergenceError: it blew up.
     """
-    body, shares = case.body, 1.0 + NUDGE * np.arange(copies)[:, None, None]
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", StabilityWarning)
-        ensemble = Ensemble(
-            body, copies=copies, w_out=case.w_out, timestep=step, integrator=integrator
-        )
-    ensemble.set_state(velocities=shares * case.velocities)
-    forces = np.broadcast_to(shares * case.forces, (copies, steps, body.n_nodes))
-    return ensemble.rollout(steps, forces=forces, record=("lengths",)).get("lengths")
+        simulation = Simulation(case.body, w_out=case.w_out, timestep=step, integrator=integrator)
+    simulation.set_state(velocities=case.velocities)
+    return simulation.rollout(steps, forces=case.forces, record=("lengths",)).get("lengths")
 
 
 def exact_motion(case: HardCase, duration: float) -> KnownMotion:
