@@ -23,7 +23,7 @@ from mcmj.utils.seeds import stream
 from mcmj.utils.validation import Array, require_names
 
 # at u = 1 [m]: feet fore and hind apart, all to the right, left and right up and down; all ahead
-TURN, BRAKE = (0.03, 0.015, 0.012), 0.1
+TURN, BRAKE = (0.03, 0.015, 0.012), 0.12
 LOWEST = {"turn": -1.0, "brake": 0.0}  # of u, by what it does; the largest is 1
 RAMP = 0.5  # s, from one value of u to the next, and in which a teacher begins
 TELL = 0.1  # s, between an operator's commands
@@ -46,7 +46,8 @@ def steering_bias(trunk: Trunk, steer: str) -> Array:
         moved[0, :, 2] = TURN[2] * left
     else:
         moved[0, :, 0] = BRAKE
-    return changes_of_length(trunk, moved)[0]
+    found: Array = changes_of_length(trunk, moved)[0]
+    return found
 
 
 def course_of_inputs(steer: str, seed: int, hold: float) -> Callable[[Array], Array]:

@@ -82,12 +82,12 @@ def energy(config: Config, gaits: Gaits, name: str, on_steps: OnSteps) -> Table:
 def ground(config: Config, gaits: Gaits, name: str, on_steps: OnSteps) -> Table:
     """Slopes, and steps up and down, that nobody taught."""
     gait = gaits[name]
-    slopes = {f"slope {slope:g}": {"slope": float(np.arctan(slope))} for slope in config.slopes}
-    steps = {f"step {1e3 * step:g} mm": {"step": step} for step in config.heights}
+    slopes = {f"slope {slope:g}": (float(np.arctan(slope)), 0.0) for slope in config.slopes}
+    steps = {f"step {1e3 * step:g} mm": (0.0, step) for step in config.heights}
     start, table = heading_ahead(gait.trunk, gait.robot()), Table()
-    for what, kind in (slopes | steps).items():
+    for what, (slope, step) in (slopes | steps).items():
         assert gait.learned is not None
-        robot = new_robot(gait.trunk, **kind)
+        robot = new_robot(gait.trunk, slope=slope, step=step)
         robot.set_readout(gait.learned.w_out)
         robot.set_state(*start)
         table[what] = _short(config, gait, robot)

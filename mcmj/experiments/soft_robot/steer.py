@@ -67,7 +67,7 @@ def learn_steered(config: Config, chosen: tuple[int, str], on_steps: OnSteps) ->
     straight = straight_curvature(trunk, config.steered, config.pace)
     target = muscle_target(trunk, config.steered, config.pace, curvature=straight)
     robot = new_robot(trunk, bias=steering_bias(trunk, steer))
-    tried = np.linspace(LOWEST[steer], 1.0, TRIED)
+    tried = np.linspace(LOWEST[steer], 1.0, TRIED).tolist()
     judge = partial(steered_error, robot, trunk, target, tried, config.learning.trial / 2)
     learned = or_lost(
         lambda: force_learn(
