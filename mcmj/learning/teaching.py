@@ -6,9 +6,8 @@ from copy import copy
 import numpy as np
 from scipy.stats.qmc import Halton
 
-from mcmj.learning.lessons import HELD, HELD_SIZE, Lesson, Teaching
+from mcmj.learning.lessons import HELD, HELD_SIZE, Lesson, TeacherNoise, Teaching
 from mcmj.learning.regression import Fit, Regression
-from mcmj.learning.teacher_noise import TeacherNoise
 from mcmj.metrics.orbits import ORBIT_POINTS
 from mcmj.simulation.reservoir import CHUNK, Reservoir
 from mcmj.targets.limit_cycles import Target

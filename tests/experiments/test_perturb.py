@@ -151,7 +151,7 @@ def test_a_body_that_blows_up_has_not_recovered(monkeypatch):
         {"task": "square"},
         {"seeds": 0},
         {"after": 5.0},
-        {"error_window": 50.0},
+        {"error_window": 90.0},
         {"noise_curve": (0,)},
         {"body": "general", "seeds": 2},
     ],

@@ -10,8 +10,7 @@ import twins
 import mcmj
 from mcmj import Simulation, Teaching, fit_readout, teach
 from mcmj.learning import teaching
-from mcmj.learning.lessons import Lesson
-from mcmj.learning.teacher_noise import TeacherNoise
+from mcmj.learning.lessons import Lesson, TeacherNoise
 from mcmj.learning.teaching import held_outputs, synchronise
 from mcmj.metrics.orbits import orbit_error
 from mcmj.targets.limit_cycles import from_array, target
