@@ -120,7 +120,7 @@ def test_a_film_is_run_as_the_file_says(tmp_path):
     alone = simulation.rollout(400, record=("positions",)).positions
     assert np.array_equal(film.positions, alone)
     with pytest.warns(OtherPhysicsWarning, match=r"timestep 0\.0005; this run takes timestep 0"):
-        _body, _source, settings = perturb.get_body(perturb.Config(body=path), 0)
+        _body, settings = perturb.get_body(perturb.Config(body=path), 0)
     assert settings == how | {"timestep": 1e-3, "engine": "mujoco"}
 
 
