@@ -43,8 +43,8 @@ def options_of(name, task):
 
 def test_the_commands_that_take_a_task():
     assert set(WITH_TASK) == {
-        "adopt", "certify", "design", "drive", "limit_cycle", "perturb", "prune", "render", "success_rate",
-        "swing_up",
+        "adopt", "certify", "design", "drive", "limit_cycle", "perturb", "prune", "render",
+        "success_rate", "swing_up",
     }  # fmt: skip
 
 
