@@ -93,6 +93,7 @@ MUJOCO = {
 }
 EXTRAS = {
     "xarray": {"simulation.trajectory_files.zarr"},
+    "sklearn": {"learning.estimator"},
     "h5py": {"simulation.trajectory_files.openprc"},
     "gymnasium": {"learning.environments.gymnasium_env"},
     "dm_control": {"experiments.adopt.suite_models", "learning.environments.environment"},

@@ -24,6 +24,7 @@ class Integrator:
         stages: evaluations of the forces in a step.
         damping_factor: r, where q_k = (-1)^k u is stable if h^2 K u + r h D u < 4 M u, but for
             what an implicit integrator solves for (see `onestep`).
+        grace: share of a step for which a step may be too long for the motion; see `along_motion`.
         advised: accurate enough to be named as a way out of a step that is too long.
     """
 
@@ -34,6 +35,7 @@ class Integrator:
     implicit: bool = False
     stages: int = 1
     damping_factor: float = 2.0
+    grace: float = 0.35
     advised: bool = True
 
     @property
@@ -44,11 +46,11 @@ class Integrator:
 
 _ROWS = (
     Integrator("Euler", "Euler", twin="semi_implicit_euler"),
-    Integrator("RK4", "RK4", twin="rk4", order=4, stages=4),
+    Integrator("RK4", "RK4", twin="rk4", order=4, stages=4, grace=0.22),
     Integrator("implicit", "implicit", implicit=True, advised=False),
     Integrator("implicitfast", "implicitfast", implicit=True, advised=False),
     Integrator("discrete", "discrete", implicit=True),
-    Integrator("leapfrog", "Euler", twin="leapfrog", order=2, damping_factor=4.0),
+    Integrator("leapfrog", "Euler", twin="leapfrog", order=2, damping_factor=4.0, grace=1.1),
     Integrator("adaptive_leapfrog", "", twin="adaptive_leapfrog", order=2, damping_factor=4.0),
 )
 INTEGRATORS = {row.name: row for row in _ROWS if row.mujoco_name}

@@ -54,6 +54,7 @@ class Experiment:
         verdict: raises McmjError if the run did not do what was asked; all is written by then.
         clean_up: removes what an interrupted run would have gone on from.
         needs_folder: the run itself writes into the folder of the results.
+        page: config.page names a web page, which `--out NAME.html` may name with its folder.
         resumes: it does, and an interrupted run goes on from what it left there.
     """
 
@@ -70,6 +71,7 @@ class Experiment:
     clean_up: Callable[[Any], object] = lambda result: None
     needs_folder: bool = False
     resumes: bool = False
+    page: bool = False
 
     @property
     def about(self) -> str:

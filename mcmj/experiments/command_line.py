@@ -56,6 +56,9 @@ def command(experiment: Experiment, arguments: Sequence[str]) -> None:
     """Parse the options of an experiment, and carry it out."""
     check_backend()
     config, output = parse(experiment, arguments)
+    if experiment.page and output.out is not None and output.out.suffix == ".html":
+        config = replace(config, page=output.out.name)
+        output = replace(output, out=output.out.parent)
     folder = prepare_folder(output.out or default_folder(experiment, config))
     with only_run(folder):
         carry_out(experiment, config, replace(output, quiet=output.quiet or output.json), folder)

@@ -15,10 +15,10 @@ from functools import partial
 import numpy as np
 
 from mcmj.core.callbacks.online_learning import Learner
+from mcmj.learning.free_run import trial_error
 from mcmj.learning.lessons import Signal, require_washout
 from mcmj.learning.recursive_regression import learner_after
 from mcmj.learning.regression import Regression
-from mcmj.learning.trial import trial_error
 from mcmj.metrics import orbits
 from mcmj.simulation.corrected_run import Stretch, run_corrected
 from mcmj.simulation.reservoir import CHUNK, Reservoir
@@ -117,7 +117,7 @@ def force_learn(
         inputs: what enters meanwhile, of times (T,) [s] on the simulation's clock: (T, n_inputs).
         judge: error of a free run of the simulation, which may leave it anywhere; infinite if it
             failed, by a fall say: then the teacher leads again, as after a blow-up. Default: the
-            orbit error of mcmj.learning.trial without inputs.
+            orbit error of mcmj.learning.free_run without inputs.
         on_steps: called with the number of steps done, for progress bars.
 
     Raises:

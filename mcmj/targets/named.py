@@ -1,6 +1,5 @@
 """Targets by what a user calls them: a known name, a CSV file, a name in Python."""
 
-import csv
 import functools
 import importlib
 import re
@@ -15,6 +14,7 @@ from mcmj.core.rollout_arguments import Driven
 from mcmj.targets.gaits import GAITS, gait_target
 from mcmj.targets.limit_cycles import TARGETS, Target, from_array, target
 from mcmj.utils.errors import InvalidArgumentError, UnknownNameError
+from mcmj.utils.files import csv_rows
 from mcmj.utils.validation import SHORTEST_STEP, Array
 
 NAMES = (*TARGETS, *GAITS)
@@ -45,6 +45,12 @@ def named_target(task: str, *others: str) -> Target:
     if ":" in task:
         return _checked(_from_python(task), re.split(r"[:.]", task)[-1], task)
     raise UnknownNameError("task", task, [*NAMES, *others, *OWN])
+
+
+def named_targets(task: str) -> dict[str, Target]:
+    """Targets by name: that of a task, or with "all" the three of the paper."""
+    tasks = tuple(TARGETS) if task == "all" else (task,)
+    return {one.name: one for one in (named_target(each, "all") for each in tasks)}
 
 
 def require_outputs(body: Driven, wanted: Target, name: str = "body") -> None:
@@ -87,16 +93,7 @@ def read_curve(path: str | Path) -> Target:
 
 def _table(path: str | Path) -> tuple[list[int], Array]:
     """The rows of numbers (T, 1 + n_outputs), and their line numbers."""
-    try:
-        with Path(path).open(encoding="utf-8-sig", newline="") as file:
-            reader = csv.reader(file)
-            rows = [(reader.line_num, cells) for cells in reader if "".join(cells).strip()]
-    except (OSError, ValueError, csv.Error) as error:
-        raise InvalidArgumentError(
-            "task",
-            f"a CSV file, or one of {', '.join(NAMES)}",
-            f"{path}: {getattr(error, 'strerror', None) or error}",
-        ) from error
+    rows = csv_rows(path, "task", f"a CSV file, or one of {', '.join(NAMES)}")
     if len(rows) <= FEWEST_ROWS:
         rows_wanted = f"a header and at least {FEWEST_ROWS} rows in {path}"
         raise InvalidArgumentError("task", rows_wanted, f"{len(rows)} lines")

@@ -1,5 +1,9 @@
-"""Result files: whole or not at all, each with its config, seed and versions. No pickle."""
+"""Result files: whole or not at all, each with its config, seed and versions. No pickle.
 
+And CSV files of the user's, as rows with their line numbers.
+"""
+
+import csv
 import dataclasses
 import functools
 import json
@@ -228,3 +232,21 @@ def plain(value: object) -> object:
     if value is None or isinstance(value, bool | int | str):
         return value
     return str(value)
+
+
+def csv_rows(path: str | Path, name: str, expected: str) -> list[tuple[int, list[str]]]:
+    """Line number and cells of every row that is not empty.
+
+    Args:
+        name, expected: the argument that the file was given as, and what it may be.
+
+    Raises:
+        InvalidArgumentError: the file cannot be read, or is not text.
+    """
+    try:
+        with Path(path).open(encoding="utf-8-sig", newline="") as file:
+            reader = csv.reader(file)
+            return [(reader.line_num, cells) for cells in reader if "".join(cells).strip()]
+    except (OSError, ValueError, csv.Error) as error:
+        reason = getattr(error, "strerror", None) or error
+        raise InvalidArgumentError(name, expected, f"{path}: {reason}") from error

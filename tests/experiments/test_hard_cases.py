@@ -11,7 +11,15 @@ import mcmj
 from mcmj.core.integrators import INTEGRATORS
 from mcmj.core.trajectory import State
 from mcmj.experiments.hard_cases.bodies import CASES
-from mcmj.experiments.hard_cases.run import Config, bisect, exact_amplitudes, run, simulate
+from mcmj.experiments.hard_cases.run import (
+    Config,
+    amplitudes_of,
+    bisect,
+    exact_motion,
+    noise,
+    run,
+    simulate,
+)
 from mcmj.reference.integration import METHODS
 from mcmj.simulation.stepsize.limit import stability_limit
 from mcmj.utils.errors import DivergenceError
@@ -106,7 +114,7 @@ def test_callback_springs_end_well(name, springs):
 def test_fine_steps_agree_with_dop853(name):
     """200 steps of 1/16 of the safe step, in which no spring turns by more than 1/8."""
     case = CASES[name](0)
-    x1, x2 = exact_amplitudes(case, 0.01)
+    x1, x2 = amplitudes_of(case.body, exact_motion(case, 0.01))
     safe = stability_limit(case.body, "RK4", elongation=x1, speed=x2, w_out=case.w_out)
     turn = np.ptp(case.velocities) / mcmj.core.body.spring_lengths(
         case.body.positions, case.body.springs
@@ -204,19 +212,41 @@ def test_a_simulation_lives_on_after_a_reset():
 def test_bisection():
     for edge in (1e-7, 3e-3, 0.3):
         assert bisect(lambda h, e=edge: h <= e, 0.01, 0.01) == pytest.approx(edge, rel=0.011)
+    assert bisect(lambda h: h <= 0.3, 0.01, 0.01, 0.2) == math.inf
     assert bisect(lambda h: True, 0.01, 0.01) == math.inf
     assert bisect(lambda h: False, 0.01, 0.01) == 0.0
+
+
+def test_noise_is_what_turns_at_every_step():
+    steps = np.arange(200)[:, None]
+    smooth = 1.0 + 0.1 * np.sin(0.05 * steps)
+    flicker = 1e-3 * (-1.0) ** steps
+    assert noise(smooth) < 1e-5
+    assert noise(smooth + flicker) == pytest.approx(1e-3, rel=0.02)
+    assert noise(smooth + flicker * (steps < 8)) < 1e-5  # over at once
 
 
 def test_experiment():
     config = Config(cases=("ordinary",), integrators=("Euler", "discrete"), precision=0.1)
     result = run(config)
     euler, discrete = result.rows
-    assert euler.safe < euler.measured < 1.1 * euler.blow_up < euler.at_rest
+    assert euler.bracketed
+    assert euler.low < euler.measured < euler.high < euler.at_rest
     assert discrete.measured == math.inf
     assert result.metrics["ordinary"]["Euler"]["measured_ms"] == 1e3 * euler.measured
     lengths = simulate(CASES["ordinary"](0), "Euler", euler.measured, 100)
     assert np.isfinite(lengths).all()
+
+
+EXPLICIT = tuple(name for name, row in INTEGRATORS.items() if not row.implicit)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", CASES)
+def test_the_bracket_holds_the_measured_limit(name):
+    for row in run(Config(cases=(name,), integrators=EXPLICIT)).rows:
+        assert row.bracketed, row
+        assert row.high == pytest.approx(2 * row.low)
 
 
 @pytest.mark.slow

@@ -98,13 +98,13 @@ return JSON.stringify(did);
 )
 HEADER, TYPES = b"\0asm\1\0\0\0", b"\x01\x04\x01\x60\x00\x00"  # one type, () -> ()
 WRITTEN = {
-    "euler": {},
+    "euler": {"integrator": "Euler"},
     "rk4": {"integrator": "RK4"},
     "discrete": {"integrator": "discrete"},
     "leapfrog": {"integrator": "leapfrog"},
-    "delayed": {"feedback_delay": 3e-3},
-    "fine": {"timestep": 5e-4, "control_period": 1e-3},
-    "space": {},
+    "delayed": {"integrator": "Euler", "feedback_delay": 3e-3},
+    "fine": {"integrator": "Euler", "timestep": 5e-4, "control_period": 1e-3},
+    "space": {"integrator": "Euler"},
 }
 
 
@@ -213,12 +213,19 @@ def test_what_a_page_cannot_do_is_said(tmp_path):
     with pytest.raises(UnknownNameError, match="unknown readout 'waltz'; valid choices: quadratic"):
         scene_of(Config(body="quadratic", readout="waltz"))
     silent = tmp_path / "silent.xml"
-    silent.write_text(mcmj.to_mjcf(mcmj.random_body(0, n_outputs=1)))
+    silent.write_text(mcmj.to_mjcf(mcmj.random_body(0, n_outputs=1), integrator="Euler"))
     with pytest.raises(InvalidArgumentError, match="body: expected 2 feedback channels"):
         scene_of(Config(body=str(silent)))
 
 
 # --- the package --------------------------------------------------------------------------------
+
+
+def test_out_may_name_the_page(package, tmp_path):
+    path = small_body(tmp_path)
+    main(["web", str(path), "--out", str(tmp_path / "mine.html"), "--quiet"])
+    assert (tmp_path / "mine.html").stat().st_size > 1e6
+    assert json.loads((tmp_path / "metrics.json").read_text())["scenario"] == "web"
 
 
 @pytest.fixture

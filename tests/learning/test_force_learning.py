@@ -5,7 +5,7 @@ import pytest
 
 import mcmj
 from mcmj.learning.force_learning import ForceLearning, force_learn
-from mcmj.learning.trial import trial_error
+from mcmj.learning.free_run import trial_error
 from mcmj.metrics.orbits import orbit_error
 from mcmj.targets.limit_cycles import target
 from mcmj.utils.errors import DivergenceError, InvalidArgumentError

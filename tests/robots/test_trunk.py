@@ -5,7 +5,7 @@ import pytest
 
 from mcmj.experiments.trunk.result import forward_speed
 from mcmj.learning.force_learning import ForceLearning, force_learn
-from mcmj.learning.trial import trial_error
+from mcmj.learning.free_run import trial_error
 from mcmj.metrics.orbits import orbit_error
 from mcmj.robots.quadruped import GRAVITY
 from mcmj.robots.trunk import TrunkSettings, draw_trunk, muscle_lengths, muscle_target

@@ -56,7 +56,7 @@ def alone_in(body, gait):
     """The body without a robot, in the units it was taught in, where a walker starts."""
     w_out = gait.w_out[:, : len(LEGS)].copy()
     w_out[:-1] *= SIZE
-    alone = Simulation(body, w_out=w_out)
+    alone = Simulation(body, w_out=w_out, integrator="Euler")
     state = np.zeros((2, body.n_nodes, 2))
     state[:, body.free] = gait.start.reshape(2, -1, 2)
     alone.set_state(body.positions + state[0] / SIZE, state[1] / (8 * SIZE))

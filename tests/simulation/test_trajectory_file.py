@@ -114,3 +114,16 @@ def test_another_npz_is_no_trajectory(tmp_path):
     np.savez(tmp_path / "other.npz", x=np.zeros(3))
     with pytest.raises(TrajectoryFileError, match=r"expected an array 'times'.*got x"):
         load_trajectory(tmp_path / "other.npz")
+
+
+def test_named_signals_are_a_data_frame(body, run):
+    pytest.importorskip("xarray", reason="the extra 'files' is not installed")
+    from mcmj.simulation.trajectory_files.zarr import to_dataset
+
+    names = mcmj.Simulation(body).signal_names
+    frame = to_dataset(run, names).lengths.to_pandas()
+    assert list(frame.columns) == list(names)
+    assert np.array_equal(frame[names[1]], run.lengths[:, 1])
+    assert np.array_equal(frame.index, run.times)
+    with pytest.raises(InvalidArgumentError, match=f"signals: expected {len(names)} names, got 2"):
+        to_dataset(run, names[:2])

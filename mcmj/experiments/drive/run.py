@@ -42,7 +42,7 @@ def run(config: Config, *, on_steps: OnSteps = lambda steps: None) -> Result:
     body = random_body(config.seed, config.nodes, n_inputs=1, n_outputs=wanted.n_outputs)
     fit = teach(Simulation(body, engine="twin"), wanted, Teaching(), config.seed)
     setting = Setting(
-        actions="inputs", input_limit=config.input_limit, kick=0.0,
+        actions="inputs", input_limit=config.input_limit, start="rest", kick=0.0, gate=1.0,
         control_timestep=config.control_timestep, time_limit=config.time_limit,
     )  # fmt: skip
     environment = make(Simulation(body, w_out=fit.w_out), wanted, setting)

@@ -4,24 +4,32 @@ from dataclasses import dataclass
 
 from mcmj.experiments.hard_cases.config import Config
 
-STEPS = ("measured", "at_rest", "safe", "blow_up")  # columns of a row
+STEPS = ("measured", "at_rest", "low", "high", "resolved")  # columns of a row
 
 
 @dataclass(frozen=True)
 class Row:
-    """One case under one integrator; steps in s, infinite if none up to 1 s fails.
+    """One case under one integrator; steps in s.
 
     Attributes:
-        measured: largest stable step.
-        at_rest, safe, blow_up: predictions, see mcmj.experiments.hard_cases.run.
+        measured: largest stable step; infinite if none fails that resolves the motion.
+        at_rest, low, high: predictions, see mcmj.experiments.hard_cases.run.
+        resolved: the longest step that resolves the motion.
     """
 
     case: str
     integrator: str
     measured: float
     at_rest: float
-    safe: float
-    blow_up: float
+    low: float
+    high: float
+    resolved: float
+
+    @property
+    def bracketed(self) -> bool:
+        """Whether the bracket holds the measured limit, as far as steps resolve the motion."""
+        low, high = (min(step, self.resolved) for step in (self.low, self.high))
+        return low <= min(self.measured, self.resolved) <= high
 
 
 @dataclass(frozen=True)
@@ -43,6 +51,6 @@ class Result:
                 if row.case == case:
                     entry[row.integrator] = {
                         f"{name}_ms": 1e3 * getattr(row, name) for name in STEPS
-                    } | {"measured_over_blow_up": row.measured / row.blow_up}
+                    } | {"bracketed": row.bracketed}
             table[case] = entry
         return table

@@ -13,10 +13,10 @@ from mcmj.experiments.soft_robot.result import measures
 from mcmj.experiments.trunk import parts as trunk_parts
 from mcmj.experiments.trunk.result import LearnedGait, Table, fell
 from mcmj.experiments.trunk.run import learn_on
+from mcmj.learning.free_run import trial_error
 from mcmj.learning.lessons import Lesson, Teaching
 from mcmj.learning.practice import Exercise, Practice, practise_exercises
 from mcmj.learning.teaching import Course
-from mcmj.learning.trial import trial_error
 from mcmj.metrics import orbits
 from mcmj.robots.energy import energy_balance
 from mcmj.robots.trunk_walker import has_fallen, heading_ahead, new_robot, stand, walk

@@ -9,7 +9,7 @@ from mcmj.experiments.blow_ups import or_lost
 from mcmj.experiments.trunk.config import Config
 from mcmj.experiments.trunk.result import LearnedGait, Table, fell, forward_speed
 from mcmj.learning.force_learning import force_learn
-from mcmj.learning.trial import trial_error
+from mcmj.learning.free_run import trial_error
 from mcmj.metrics import orbits as metrics
 from mcmj.robots.trunk_walker import has_fallen, new_robot, stand, walk
 from mcmj.simulation.reservoir import Reservoir

@@ -10,7 +10,7 @@ from mcmj.experiments.trunk.config import Config
 from mcmj.experiments.trunk.parts import RUNS, push_summary
 from mcmj.experiments.trunk.result import LearnedGait, Result, Table, seeds_table, walk_table
 from mcmj.learning.force_learning import Learned, force_learn
-from mcmj.learning.trial import trial_error
+from mcmj.learning.free_run import trial_error
 from mcmj.robots.steering import straight_curvature
 from mcmj.robots.trunk import Trunk, draw_trunk, muscle_target
 from mcmj.robots.trunk_walker import has_fallen, new_robot, stand, walk

@@ -153,7 +153,7 @@ def _window(config: Config) -> tuple[Viewer, LiveLoop]:
 def _simulation_and_readouts(config: Config) -> tuple[Simulation, dict[str, Array]]:
     """As the file says."""
     stored = open_body(config.body)
-    readouts = readouts_of(stored, config.seed, **stored.take(engine="twin"))
+    readouts = readouts_of(stored, config.seed, engine="twin")
     return Simulation(stored.body, **stored.take()), readouts
 
 

@@ -2,6 +2,9 @@
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated
+
+import tyro
 
 from mcmj.utils.validation import require_number, require_seed
 
@@ -20,14 +23,16 @@ class Config:
         deformation: displacements are drawn this many times larger; default: a round factor
             that makes them visible.
         seed: of teaching.
+        page: name of the page in the folder; `--out NAME.html` says both.
     """
 
-    body: str = "general"
+    body: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="BODY")] = "general"
     readout: str | None = None
     package: Path | None = None
     kick_speed: float = 0.5
     deformation: float | None = None
     seed: int = 0
+    page: str = "page.html"
 
     def __post_init__(self) -> None:
         require_seed("seed", self.seed)

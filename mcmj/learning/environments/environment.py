@@ -6,6 +6,7 @@ dm_control.
 """
 
 from collections import OrderedDict
+from collections.abc import Sequence
 from typing import Any
 
 import mujoco as mj
@@ -13,8 +14,8 @@ import numpy as np
 
 from mcmj.learning.environments.setting import Setting
 from mcmj.learning.environments.tasks import all_tasks as all_tasks
-from mcmj.learning.environments.tasks import assign, state_on_cycle
-from mcmj.metrics.orbit_window import OrbitWindow
+from mcmj.learning.environments.tasks import assign, states_on_cycle
+from mcmj.metrics.motion_error import MotionError
 from mcmj.simulation.reservoir import Reservoir
 from mcmj.simulation.simulation import Simulation
 from mcmj.targets.limit_cycles import Target
@@ -28,7 +29,6 @@ with extra("control", "environments need dm_control"):
     from dm_control.mujoco import wrapper
     from dm_control.rl import control
     from dm_control.suite import base
-    from dm_control.utils import rewards
     from dm_env import specs
 
 RUNAWAY_LENGTH, RUNAWAY_OUTPUT = 10.0, 100.0  # of a body's size and the target's
@@ -81,18 +81,24 @@ class Physics(mujoco.Physics):
 
 
 class Orbit(base.Task):
-    """Generate a target's orbit; the agent acts on input channels and fed-back outputs.
+    """Generate a target's orbit at its pace; the agent acts on inputs and fed-back outputs.
 
-    Reward in [0, 1] from the orbit error of the last period (metrics.orbit_window). It says where
-    the outputs are, not how fast they go round.
+    The reward of a control step is in [0, 1]:
+
+        reward = 0.1^(e^2 / margin^2)
+
+    e is the distance of the outputs' place and velocity, over the step, to the nearest point of
+    the target's motion (metrics.motion_error): 1 on the orbit at its pace, whatever the phase;
+    at most 0.1^(1 / margin^2) for outputs that stand still, 1e-4 with the default margin.
 
     Args:
         reservoir: with its readout.
         target: the orbit; its value at each moment is observed too.
         setting: what the agent may do.
         inputs: (n_inputs,) that the agent's are added to.
-        first: MuJoCo's integration state at an episode's start; None: the model's own start.
-        random: a seed or a RandomState, for the kick.
+        starts: MuJoCo's integration states, one of which an episode starts from; none: the
+            model's own start.
+        random: a seed or a RandomState, for start and kick.
     """
 
     def __init__(
@@ -101,23 +107,25 @@ class Orbit(base.Task):
         target: Target,
         setting: Setting,
         inputs: Array,
-        first: Array | None = None,
+        starts: Sequence[Array] = (),
         random: int | np.random.RandomState = 0,
     ) -> None:
         super().__init__(random=random)
-        self.target, self.setting, self._first = target, setting, first
+        self.target, self.setting, self._starts = target, setting, starts
         self._install = reservoir.in_mujoco.install
         at = reservoir.in_mujoco.channels
         self._held = np.zeros(reservoir.model.nu)
         self._held[at.inputs] = inputs
         sizes = np.zeros(reservoir.model.nu)
-        sizes[at.inputs], sizes[at.outputs] = setting.limits
+        largest = float(np.abs(target.orbit(4096)).max())
+        sizes[at.inputs], sizes[at.outputs] = setting.limits(largest)
         self._acted = [c for part in (at.inputs, at.outputs) for c in range(part.start, part.stop)]
         self._acted = [c for c in self._acted if sizes[c] > 0]
         self._limits = sizes[self._acted]
         if not self._acted:
             raise InvalidArgumentError("actions", "channels that the body has", setting.actions)
-        self._window = OrbitWindow(target, setting.control_timestep)
+        self._motion = MotionError(target, setting.control_timestep)
+        self._before = np.zeros(target.n_outputs)
         self._bounds = _observation_bounds(reservoir, target)
 
     def reseed(self, seed: int) -> None:
@@ -125,26 +133,23 @@ class Orbit(base.Task):
         self.random.seed(seed)
 
     def initialize_episode(self, physics: Physics) -> None:
-        """The model's start or a point of the cycle, kicked."""
+        """The model's start or a random point of the cycle, kicked."""
         self._install()  # another package may have taken the callbacks out
         kick = self.setting.kick * self.random.standard_normal(physics.model.nv)
-        if self._first is not None:
+        if self._starts:
+            first = self._starts[self.random.randint(len(self._starts))]
             spec = mj.mjtState.mjSTATE_INTEGRATION.value
-            mj.mj_setState(physics.model.ptr, physics.data.ptr, self._first, spec)
+            mj.mj_setState(physics.model.ptr, physics.data.ptr, first, spec)
         physics.data.qvel[:] += kick
         physics.sense()
         physics.blew_up = False
-        self._window.clear()
         super().initialize_episode(physics)
 
     def before_step(self, action: Array, physics: Physics) -> None:
         """Actions beyond their bounds are clipped."""
+        self._before = physics.outputs()
         physics.data.ctrl[:] = self._held
         physics.data.ctrl[self._acted] += np.clip(action, -self._limits, self._limits)
-
-    def after_step(self, physics: Physics) -> None:
-        """Remember the outputs."""
-        self._window.add(physics.outputs())
 
     def action_spec(self, physics: Physics) -> specs.BoundedArray:
         """Inputs [units of the channel], then offsets [units of the outputs]."""
@@ -175,12 +180,11 @@ class Orbit(base.Task):
         return 0.0 if gone else None
 
     def get_reward(self, physics: Physics) -> float:
-        """1 up to the orbit error `good`, 0.1 a margin further, by a Gaussian."""
+        """As the class says; 0 if the body blew up."""
         if physics.blew_up:
             return 0.0
-        setting = self.setting
-        bounds = (0.0, setting.good)
-        return float(rewards.tolerance(self._window.error, bounds=bounds, margin=setting.margin))
+        error = self._motion.of(physics.outputs(), self._before)
+        return float(0.1 ** (error / self.setting.margin) ** 2)
 
 
 class Environment(control.Environment):
@@ -216,10 +220,10 @@ def make(
     setting.check_step(reservoir.timestep)
     constant = np.zeros(reservoir.n_inputs) if inputs is None else inputs
     held = as_array("inputs", constant, (reservoir.n_inputs,))
-    first = state_on_cycle(reservoir, target, held) if setting.start == "cycle" else None
+    starts = states_on_cycle(reservoir, target, held) if setting.start == "cycle" else ()
     return Environment(
         Physics.of_reservoir(reservoir, setting.gate),
-        Orbit(reservoir, target, setting, held, first, random),
+        Orbit(reservoir, target, setting, held, starts, random),
         time_limit=setting.time_limit,
         control_timestep=setting.control_timestep,
         legacy_step=False,  # whole steps: a step knows its action from its start

@@ -23,6 +23,8 @@ ID = "mcmj/Orbit-v0"
 class OrbitEnv(gymnasium.Env[dict[str, Any], Array]):
     """A body that is to generate an orbit; see mcmj.learning.environments.environment.Orbit.
 
+    Actions are in [-1, 1]: shares of the largest ones there.
+
     Args:
         name, task, setting, stepping: as for mcmj.learning.environments.environment.load.
         environment: an environment made by environment.make, instead of a name.
@@ -45,8 +47,8 @@ class OrbitEnv(gymnasium.Env[dict[str, Any], Array]):
         self.render_mode = render_mode
         frames = round(1 / self.environment.control_timestep())
         self.metadata = {**self.metadata, "render_fps": frames}
-        action = self.environment.action_spec()
-        self.action_space = spaces.Box(action.minimum, action.maximum, action.shape, np.float64)
+        self._largest = self.environment.action_spec().maximum
+        self.action_space = spaces.Box(-1.0, 1.0, self._largest.shape, np.float64)
         self.observation_space: spaces.Dict = spaces.Dict(
             {
                 key: spaces.Box(spec.minimum, spec.maximum, spec.shape, np.float64)
@@ -65,7 +67,7 @@ class OrbitEnv(gymnasium.Env[dict[str, Any], Array]):
 
     def step(self, action: Array) -> tuple[dict[str, Array], float, bool, bool, dict[str, Any]]:
         """One control step; terminated if the outputs ran away, truncated by the time limit."""
-        step = self.environment.step(action)
+        step = self.environment.step(self._largest * action)
         terminated = step.last() and step.discount == 0.0
         return dict(step.observation), step.reward, terminated, step.last() and not terminated, {}
 

@@ -15,15 +15,17 @@ class Setting:
     Attributes:
         actions: inputs (of the input channels), offsets (added to the fed-back outputs),
             or both, in this order.
-        input_limit, offset_limit: largest size of each.
-        start: rest (the model's start, time 0) or cycle (on the target, by teacher forcing).
+        input_limit: largest input.
+        offset_limit: largest offset, in units of the target's largest value.
+        start: cycle (somewhere on the target, by teacher forcing, at random) or rest (the
+            model's start, time 0).
         kick: standard deviation of the joints' first velocities, on top, MuJoCo's units; of a
             body's nodes [m/s].
-        gate: 1: the loop is closed; 0: open, the agent is all that feeds back.
+        gate: 0: the loop is open, and the agent is all that feeds back; 1: the readout's loop is
+            closed, and the agent acts beside it.
         control_timestep: between actions [s], a multiple of the physics' step.
         time_limit: of an episode [s].
-        good: orbit error up to which the reward is 1.
-        margin: further from it than this the reward is below 0.1.
+        margin: motion error at which the reward is 0.1.
 
     Raises:
         InvalidArgumentError, UnknownNameError: out of bounds, or no such choice.
@@ -31,14 +33,13 @@ class Setting:
 
     actions: str = "both"
     input_limit: float = 1.0
-    offset_limit: float = 1.0
-    start: str = "rest"
-    kick: float = 0.01
-    gate: float = 1.0
+    offset_limit: float = 2.0
+    start: str = "cycle"
+    kick: float = 0.05
+    gate: float = 0.0
     control_timestep: float = 0.02
     time_limit: float = 20.0
-    good: float = 0.05
-    margin: float = 1.0
+    margin: float = 0.5
 
     def __post_init__(self) -> None:
         choices = {"actions": ACTIONS, "start": STARTS}
@@ -46,7 +47,7 @@ class Setting:
             if getattr(self, name) not in valid:
                 raise UnknownNameError(name, getattr(self, name), valid)
         require_duration("time_limit", self.time_limit)
-        for name in ("input_limit", "offset_limit", "good", "margin"):
+        for name in ("input_limit", "offset_limit", "margin"):
             require_number(name, getattr(self, name), 0.0, open_low=True)
         require_number("kick", self.kick, 0.0)
         require_number("gate", self.gate, 0.0)
@@ -64,8 +65,11 @@ class Setting:
                 "control_timestep", f"a multiple of {timestep:g} s", self.control_timestep
             )
 
-    @property
-    def limits(self) -> tuple[float, float]:
-        """Largest size of an action on inputs and on fed-back outputs; 0: no action."""
+    def limits(self, largest: float) -> tuple[float, float]:
+        """Largest size of an action on inputs and on fed-back outputs; 0: no action.
+
+        Args:
+            largest: value of the target.
+        """
         inputs = 0.0 if self.actions == "offsets" else self.input_limit
-        return inputs, 0.0 if self.actions == "inputs" else self.offset_limit
+        return inputs, 0.0 if self.actions == "inputs" else self.offset_limit * largest

@@ -27,6 +27,7 @@ from mcmj.utils.errors import InvalidArgumentError, UnknownNameError
 from mcmj.utils.validation import Array
 
 DRIVEN = {f"eps={value:g}": value for value in (5.0, 1.0, 0.2)}  # those of Figs. 10 and 11
+PHASES = 16  # of the cycle, that episodes start from
 TEACHABLE = {2: tuple(TARGETS), len(LEGS): tuple(GAITS)}  # by the number of outputs
 
 
@@ -81,18 +82,21 @@ def all_tasks() -> list[tuple[str, str]]:
     return [(name, task) for name in body_names() for task in _taught_already(open_body(name))]
 
 
-def state_on_cycle(reservoir: Reservoir, wanted: Target, inputs: Array) -> Array:
+def states_on_cycle(reservoir: Reservoir, wanted: Target, inputs: Array) -> list[Array]:
     """Where clean teacher forcing from rest brings a reservoir, inputs (n_inputs,) held.
 
     Returns:
-        MuJoCo's integration state (n,); the reservoir stays as it was.
+        PHASES of MuJoCo's integration states (n,), round the cycle; the reservoir stays as it was.
     """
     before = reservoir.snapshot()
     reservoir.reset()
     synchronise(reservoir, wanted, Teaching().washout, inputs)
-    state: Array = reservoir.in_mujoco.batch.state[0].copy()
+    states = []
+    for _ in range(PHASES):
+        states.append(reservoir.in_mujoco.batch.state[0].copy())
+        synchronise(reservoir, wanted, wanted.period / PHASES, inputs)
     reservoir.restore(before)
-    return state
+    return states
 
 
 def _taught_already(stored: StoredBody) -> dict[str, Array]:

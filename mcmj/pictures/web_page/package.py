@@ -12,9 +12,8 @@ from dataclasses import dataclass
 from importlib.metadata import files
 from pathlib import Path
 
-from mcmj.targets.kept_arrays import cache_folder
 from mcmj.utils.errors import PackageError
-from mcmj.utils.files import prepare_folder, whole_file
+from mcmj.utils.files import cache_folder, prepare_folder, whole_file
 
 VERSION = "3.14.0"
 PACKAGE = f"@mujoco/mujoco@{VERSION}"

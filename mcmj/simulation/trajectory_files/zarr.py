@@ -6,7 +6,7 @@ and copy for copies; of a model that is no body, its joints and sensors.
 """
 
 import json
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -36,8 +36,18 @@ _NOTES = {2: {"axis": "x, y"}, 3: {"axis": "x, y, z"}}
 _UNITS = {"lengths": "m", "outputs": "1", "positions": "m", "velocities": "m/s"}  # of a body
 
 
-def to_dataset(trajectory: Trajectory) -> xarray.Dataset:
-    """A Dataset with named, unit-bearing axes; an ensemble has the axis "copy" too."""
+def to_dataset(trajectory: Trajectory, signals: Sequence[str] | None = None) -> xarray.Dataset:
+    """A Dataset with named, unit-bearing axes; an ensemble has the axis "copy" too.
+
+    One array of it as a pandas DataFrame, a column a signal: `.lengths.to_pandas()`.
+
+    Args:
+        signals: labels of the axis "spring", such as `Reservoir.signal_names`; Zarr has no stable
+            format for them, so files have none.
+
+    Raises:
+        InvalidArgumentError: more or fewer labels than signals.
+    """
     variables = {}
     for name in RECORDABLE:
         array = getattr(trajectory, name)
@@ -46,7 +56,13 @@ def to_dataset(trajectory: Trajectory) -> xarray.Dataset:
             note = _NOTES[array.shape[-1]] if "axis" in axes else {}
             variables[name] = (axes, array, {"units": _UNITS.get(name, "")} | note)
     time = ("time", trajectory.times, {"units": "s", "long_name": "time at the start of the step"})
-    return xarray.Dataset(variables, coords={"time": time})
+    dataset = xarray.Dataset(variables, coords={"time": time})
+    if signals is None:
+        return dataset
+    if len(signals) != dataset.sizes.get("spring"):
+        wanted = f"{dataset.sizes.get('spring', 'recorded lengths,')} names"
+        raise InvalidArgumentError("signals", wanted, len(signals))
+    return dataset.assign_coords(spring=list(signals))
 
 
 def from_dataset(dataset: xarray.Dataset) -> Trajectory:
