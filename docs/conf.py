@@ -14,6 +14,9 @@ from sphinx.application import Sphinx
 import mcmj
 from mcmj.experiments.command_line import parse
 from mcmj.experiments.registry import GROUPS, entries, experiment_named
+from mcmj.experiments.web.config import Config as Page
+from mcmj.experiments.web.run import run as web_page
+from mcmj.utils.errors import PackageError
 
 project = "mcmj"
 author = copyright = "The mcmj developers"
@@ -38,11 +41,18 @@ napoleon_use_ivar = True
 python_maximum_signature_line_length = 90
 suppress_warnings = ["config.cache"]
 DATA = Path(__file__).parent / "data"
+EXTRA = Path(__file__).parent.parent / "build" / "extra"  # files of the site that are made
+html_extra_path = [str(EXTRA)]
+BODY = """```{raw} html
+<iframe src="body.html" title="A soft body at work: pull a mass" loading="lazy"
+ style="width: 100%; height: 52rem; border: 0"></iframe>
+```"""
 SECTION = re.compile(r"(Args|Attributes|Raises|Returns|Yields):$")
 
 
 def setup(app: Sphinx) -> None:
     """What Sphinx is told besides."""
+    EXTRA.mkdir(parents=True, exist_ok=True)
     app.connect("autodoc-process-docstring", as_rst, priority=100)  # before napoleon
     app.connect("source-read", generated)
 
@@ -76,8 +86,21 @@ def _text(line: str) -> str:
 def generated(app: Sphinx, page: str, source: list[str]) -> None:
     """Pages made of the code and the data as they are."""
     makers = {"reference/commands": _commands, "reference/metrics": _metrics}
+    if page == "index" and app.builder.format == "html":
+        source[0] = re.sub(r"^!\[A body.*?\)$", _body, source[0], count=1, flags=re.M)
     if page in makers:
         source[0] += "\n".join(makers[page]())
+
+
+def _body(picture: re.Match[str]) -> str:
+    """A body that runs in the page; its picture where npm cannot fetch MuJoCo's package."""
+    try:
+        made = web_page(Page(body="general", readout="lissajous")).html
+    except PackageError as error:
+        print(f"no body in the front page: {error}")
+        return picture[0]
+    (EXTRA / "body.html").write_text(made, encoding="utf-8")
+    return BODY
 
 
 def _commands() -> Iterator[str]:

@@ -138,7 +138,11 @@ def filled(text: str) -> str:
         if found["what"] == "commands":
             body = "```sh\n" + "".join(f"mcmj {run.command}\n" for run in runs.values()) + "```\n"
         else:
-            body = "\n".join(_table(found["rest"])) + "\n"
+            try:
+                body = "\n".join(_table(found["rest"])) + "\n"
+            except FileNotFoundError as error:
+                print(f"docs: {error}")
+                return found[0]  # as it was
         return f"{found['start']}{body}{found['end']}"
 
     return _BLOCK.sub(block, text)
@@ -163,7 +167,7 @@ def _table(asked: str) -> Iterator[str]:
 def _metrics_of(name: str) -> dict[str, Any]:
     path = DOCS / "data" / f"{name}.json"
     if not path.is_file():
-        raise SystemExit(f"docs: {path} is missing: run the page that has {name}, with --run")
+        raise FileNotFoundError(f"{path.name} is missing: run the page that has it, with --run")
     text = path.read_text(encoding="utf-8")
     metrics: dict[str, Any] = json.loads(text, object_pairs_hook=_Metrics)["metrics"]
     return metrics

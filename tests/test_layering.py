@@ -75,6 +75,7 @@ MUJOCO = {
     "pictures.window.viewer",
     "pictures.walk_video",
     "robots.ground",
+    "robots.energy",
     "robots.trunk_walker",
     "robots.walk_scene",
     "simulation.batch_engine",

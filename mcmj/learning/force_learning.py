@@ -10,14 +10,15 @@ remains is a linear, static readout, as a regression's.
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, fields
+from functools import partial
 
 import numpy as np
 
 from mcmj.core.callbacks.online_learning import Learner
-from mcmj.learning.lessons import require_washout
+from mcmj.learning.free_run import trial_error
+from mcmj.learning.lessons import Signal, require_washout
 from mcmj.learning.recursive_regression import learner_after
 from mcmj.learning.regression import Regression
-from mcmj.learning.trial import Failed, trial_error
 from mcmj.metrics import orbits
 from mcmj.simulation.corrected_run import Stretch, run_corrected
 from mcmj.simulation.reservoir import CHUNK, Reservoir
@@ -102,7 +103,8 @@ def force_learn(
     *,
     seed: int,
     stand: Start = None,
-    failed: Failed | None = None,
+    inputs: Signal | None = None,
+    judge: Callable[[], float] | None = None,
     on_steps: OnSteps = lambda steps: None,
 ) -> Learned:
     """Teach a target; the simulation is left at it, in closed loop, with the best readout.
@@ -112,8 +114,10 @@ def force_learn(
         seed: of the noise.
         stand: where the teacher begins: a snapshot, or a function that brings the simulation
             there; default: its reset.
-        failed: whether a part of a trial shows that it failed, by a fall say; the teacher then
-            leads again, as after a blow-up. See mcmj.learning.trial.
+        inputs: what enters meanwhile, of times (T,) [s] on the simulation's clock: (T, n_inputs).
+        judge: error of a free run of the simulation, which may leave it anywhere; infinite if it
+            failed, by a fall say: then the teacher leads again, as after a blow-up. Default: the
+            orbit error of mcmj.learning.free_run without inputs.
         on_steps: called with the number of steps done, for progress bars.
 
     Raises:
@@ -121,7 +125,8 @@ def force_learn(
         InvalidArgumentError: the engine is the twin.
     """
     require_outputs(simulation, target, "simulation")
-    teacher = _Teacher(simulation, target, learning, seed, on_steps)
+    teacher = _Teacher(simulation, target, learning, inputs, seed, on_steps)
+    judge = judge or partial(trial_error, simulation, target, learning.trial, on_steps=on_steps)
     learner = teacher.begin(stand)
     best, errors = (simulation.readout.rows, simulation.snapshot()), list[float]()
     for _ in range(learning.rounds):
@@ -134,7 +139,7 @@ def force_learn(
                 raise
             break
         now = simulation.readout.rows, simulation.snapshot()
-        errors.append(trial_error(simulation, target, learning.trial, failed, on_steps=on_steps))
+        errors.append(judge())
         simulation.restore(now[1])
         if errors[-1] <= min(errors):
             best = now
@@ -153,10 +158,12 @@ class _Teacher:
         simulation: Reservoir,
         target: Target,
         learning: ForceLearning,
+        inputs: Signal | None,
         seed: int,
         on_steps: OnSteps,
     ) -> None:
         self._simulation, self._target, self._learning = simulation, target, learning
+        self._inputs = inputs
         self._rng, self._on_steps = stream(seed, "teacher_noise"), on_steps
         step = simulation.in_mujoco.timestep
         radius = orbits.rms_radius(target.orbit(orbits.ORBIT_POINTS))
@@ -168,7 +175,9 @@ class _Teacher:
         """The teacher drives and a regression learns, with which the simulation then goes on."""
         start, regression = self._stand(stand), Regression(bias=True)
         for stretch in self._stretches(self._learning.warm_up - self._learning.washout, start):
-            run = self._simulation.rollout(offset=stretch.offset, gate=0.0, record=("signals",))
+            run = self._simulation.rollout(
+                None, stretch.inputs, stretch.offset, 0.0, record=("signals",)
+            )
             regression.add(run.get("signals")[:: self._every], stretch.targets)
             self._on_steps(len(run))
         learner = learner_after(regression, self._learning.ridge)
@@ -201,7 +210,7 @@ class _Teacher:
             self._simulation.restore(stand)
         start = self._simulation.time
         for stretch in self._stretches(self._learning.washout, start):
-            self._simulation.rollout(offset=stretch.offset, gate=0.0, record=())
+            self._simulation.rollout(None, stretch.inputs, stretch.offset, 0.0, record=())
             self._on_steps(len(stretch.offset))
         return start
 
@@ -219,4 +228,5 @@ class _Teacher:
             if lead_from is not None:
                 ramp = np.minimum(1.0, (times - lead_from) / RAMP)
                 offset += ramp[:, None] * self._target.sample(times)
-            yield Stretch(self._target.sample(times[:: self._every]), offset)
+            inputs = None if self._inputs is None else self._inputs(times)
+            yield Stretch(self._target.sample(times[:: self._every]), offset, inputs)

@@ -1,17 +1,22 @@
-"""Long free runs in closed loop: flat memory, checkpoints, errors in windows."""
+"""Free runs in closed loop: flat memory, checkpoints, errors in windows, trials."""
+
+from collections.abc import Callable
 
 import numpy as np
 
+from mcmj.core.trajectory import Trajectory
 from mcmj.learning.regression import Fit
 from mcmj.metrics import orbits
 from mcmj.simulation.reservoir import Reservoir
+from mcmj.simulation.simulation import Simulation
 from mcmj.targets.limit_cycles import Target
 from mcmj.utils.checkpoint import Checkpoint
-from mcmj.utils.errors import InvalidArgumentError
+from mcmj.utils.errors import DivergenceError, InvalidArgumentError
 from mcmj.utils.progress import OnSteps
 from mcmj.utils.validation import Array, require_number
 
 WINDOW = 50.0  # s
+Failed = Callable[[Trajectory], bool]
 
 
 def resume(simulation: Reservoir, checkpoint: Checkpoint) -> tuple[Array, Fit | None] | None:
@@ -114,3 +119,35 @@ def window_errors(
         "orbit_error_ratio": errors[-1] / errors[1] if enough else None,
         "period_drift": (periods[-1] - periods[1]) / target.period if enough else None,
     }
+
+
+def trial_error(
+    simulation: Reservoir,
+    target: Target,
+    duration: float,
+    failed: Failed | None = None,
+    *,
+    on_steps: OnSteps = lambda steps: None,
+) -> float:
+    """Orbit error of the outputs in the last half of a free run; infinite if it fails.
+
+    Args:
+        duration: [s].
+        failed: asked of every part of the run, whose outputs and qpos (of a body: positions) are
+            recorded; a run that blows up has failed too.
+        on_steps: called with the number of steps done after every part, for progress bars.
+    """
+    place = "positions" if isinstance(simulation, Simulation) else "qpos"
+    record = ("outputs", place) if failed else ("outputs",)
+    steps, kept, done = round(duration / simulation.timestep), [], 0
+    try:
+        for part in simulation.stream(steps, record=record):
+            if failed is not None and failed(part):
+                return np.inf
+            done += len(part)
+            if done > steps // 2:
+                kept.append(part.get("outputs"))
+            on_steps(len(part))
+    except DivergenceError:
+        return np.inf
+    return orbits.orbit_error(np.concatenate(kept)[-(steps - steps // 2) :], target)

@@ -4,9 +4,11 @@ from collections.abc import Iterable
 from copy import copy
 
 import numpy as np
+from scipy.stats.qmc import Halton
 
-from mcmj.learning.lessons import Lesson, Teaching
+from mcmj.learning.lessons import HELD, HELD_SIZE, Lesson, TeacherNoise, Teaching
 from mcmj.learning.regression import Fit, Regression
+from mcmj.metrics.orbits import ORBIT_POINTS
 from mcmj.simulation.reservoir import CHUNK, Reservoir
 from mcmj.targets.limit_cycles import Target
 from mcmj.targets.named import require_outputs
@@ -67,12 +69,23 @@ def teach_lessons(
 
 
 def lessons_of(target: Target, teaching: Teaching) -> list[Lesson]:
-    """What `teaching` asks for: the runs from rest, then the one on the cycle."""
-    from_rest = Lesson(
-        target.sample, teaching.rest_duration, weight=teaching.rest_weight, from_rest=True
-    )
+    """What `teaching` asks for: the runs from rest and where it was held, the one on the cycle."""
+    duration, weight = teaching.away_duration, teaching.away_weight
+    from_rest = Lesson(target.sample, duration, weight=weight, from_rest=True)
+    held = [
+        Lesson(target.sample, HELD + duration, HELD, weight=weight, held=outputs)
+        for outputs in held_outputs(target, teaching.held_runs)
+    ]
     on_cycle = Lesson(target.sample, teaching.duration, teaching.washout)
-    return [*[from_rest] * teaching.rest_runs, on_cycle]
+    return [*[from_rest] * teaching.rest_runs, *held, on_cycle]
+
+
+def held_outputs(target: Target, count: int) -> Array:
+    """Constants (count, n_outputs), evenly over the box of HELD_SIZE times the largest outputs."""
+    largest = np.abs(target.orbit(ORBIT_POINTS)).max(axis=0)
+    places = Halton(target.n_outputs, scramble=False).random(count + 1)[1:]  # the first is a corner
+    found: Array = HELD_SIZE * largest * (2.0 * places - 1.0)
+    return found
 
 
 class Course:
@@ -140,11 +153,15 @@ class Course:
         step = self.simulation.timestep
         total, washout = round(lesson.duration / step), round(lesson.washout / step)
         first = round(self.simulation.time / step)
+        noise = self._noise_of(lesson)
         for start in range(0, total, CHUNK):
             steps = np.arange(start, min(start + CHUNK, total))
             times = step * (first + steps).astype(np.float64)
             clean = lesson.outputs(times)
-            signals = self._signals(lesson, times, clean)
+            fed = clean.copy()
+            if lesson.held is not None:
+                fed[steps < washout] = lesson.held
+            signals = self._signals(lesson, times, fed, noise.take(len(steps)))
             every = self._teaching.every
             earliest = -(-max(start, washout) // every) * every
             learned = slice(earliest - start, None, every)
@@ -154,14 +171,18 @@ class Course:
                 regression.add(signals[learned], clean[learned], weight=weights)
             on_steps(len(steps))
 
-    def _signals(self, lesson: Lesson, times: Array, clean: Array) -> Array:
+    def _noise_of(self, lesson: Lesson) -> TeacherNoise:
+        """Of the outputs that have a share of it: the others draw nothing from the stream."""
+        generator = self._rest_noise if lesson.elsewhere else self._noise
+        loud = int((np.broadcast_to(lesson.noise_share, self.simulation.n_outputs) > 0).sum())
+        return TeacherNoise(self._teaching, generator, loud, self.simulation.timestep)
+
+    def _signals(self, lesson: Lesson, times: Array, fed: Array, noise: Array) -> Array:
         """Signals (T, n_signals) under the teacher, as the readout hears them."""
-        noise = self._rest_noise if lesson.elsewhere else self._noise
-        noisy = (1.0 - lesson.own_share) * clean
-        share = np.broadcast_to(lesson.noise_share, clean.shape[1])
-        loud = share > 0  # only these draw from the stream
-        drawn = noise.standard_normal((len(clean), loud.sum()))
-        noisy[:, loud] += self._teaching.noise * share[loud] * drawn
+        noisy = (1.0 - lesson.own_share) * fed
+        share = np.broadcast_to(lesson.noise_share, fed.shape[1])
+        loud = share > 0
+        noisy[:, loud] += share[loud] * noise
         run = self.simulation.rollout(
             inputs=None if lesson.inputs is None else lesson.inputs(times),
             offset=noisy,

@@ -27,9 +27,14 @@ from mcmj.utils.validation import Array
 
 
 def trunk_video(
-    path: str | Path, model: mujoco.MjModel, trunk: Trunk, walks: Mapping[str, Walk]
+    path: str | Path,
+    model: mujoco.MjModel,
+    trunk: Trunk,
+    walks: Mapping[str, Walk],
+    *,
+    speed: float = 1.0,
 ) -> None:
-    """Film walks of one robot, one after the other, in real time.
+    """Film walks of one robot, one after the other, in real time, or so many times faster.
 
     Args:
         model: of the robot.
@@ -43,8 +48,8 @@ def trunk_video(
     ends = np.cumsum([len(one.times) for one in walks.values()]) * walk.sample
     starts = [0.0, *ends.tolist()]
     diagram = GaitDiagram(walk, [Event(*event) for event in zip(starts, walks, strict=False)])
-    rows, joints = shown_rows(walk)
-    springs = np.arange(trunk.n_sensed)
+    rows, joints = shown_rows(walk, speed)
+    springs, flat = np.arange(trunk.n_sensed), trunk.body.dimensions == 2
     strains = spring_strains(model, springs, joints)
     words = [
         ("The trunk's springs are all that", BLACK),
@@ -64,23 +69,31 @@ def trunk_video(
             rows, joints, strain_colours(strains, np.abs(strains).max()), strict=True
         ):
             model.tendon_rgba[springs, :3] = colours
-            centre = np.array([walk.trunk[0, row, 0], 0.8 * trunk.settings.leg, 0.0])
+            x, y, height = walk.trunk[0, row, :3]
+            centre = [x, 0.8 * trunk.settings.leg, 0.0] if flat else [x, y, 0.7 * height]
             drawn = diagram.draw(walk.times[row])
             beside[-len(drawn) :] = drawn
-            video.add_image(np.hstack([_picture(model, renderer, qpos, centre), beside]))
+            video.add_image(np.hstack([_picture(model, renderer, qpos, centre, flat=flat), beside]))
 
 
 def _picture(
-    model: mujoco.MjModel, renderer: mujoco.Renderer, qpos: Array, centre: Array
+    model: mujoco.MjModel,
+    renderer: mujoco.Renderer,
+    qpos: Array,
+    centre: list[float],
+    *,
+    flat: bool,
 ) -> Picture:
-    """The robot from the side, with a point in the middle of the picture."""
+    """The robot, with a point in the middle of the picture."""
     data, camera = mujoco.MjData(model), mujoco.MjvCamera()
     data.qpos[:] = qpos
     mujoco.mj_forward(model, data)
     camera.type = mujoco.mjtCamera.mjCAMERA_FREE
     camera.lookat[:] = centre
-    # along -z with y upwards, from a little above the ground
-    camera.distance, camera.azimuth, camera.elevation = 3.4, 90.0, -100.0
+    if flat:  # along -z with y upwards, from a little above the ground
+        camera.distance, camera.azimuth, camera.elevation = 3.4, 90.0, -100.0
+    else:  # from the side and a little ahead
+        camera.distance, camera.azimuth, camera.elevation = 2.9, 125.0, -14.0
     renderer.update_scene(data, camera)
     found: Picture = renderer.render()
     return found

@@ -82,10 +82,10 @@ def walk_video(
             video.add_image(np.hstack([robot_picture, side]))
 
 
-def shown_rows(walk: Walk) -> tuple[Indices, Array]:
-    """Rows (F,) of a walk that a film in real time shows, and the first copy's joints there."""
+def shown_rows(walk: Walk, speed: float = 1.0) -> tuple[Indices, Array]:
+    """Rows (F,) of a walk that a film shows, in real time at speed 1; the first copy's joints."""
     assert walk.joints is not None
-    rows = np.searchsorted(walk.times, np.arange(0, walk.times[-1] - walk.sample, 1 / FPS))
+    rows = np.searchsorted(walk.times, np.arange(0, walk.times[-1] - walk.sample, speed / FPS))
     return rows, walk.joints[0, rows]
 
 

@@ -81,6 +81,7 @@ def integrate_continuous(
     timestep: float,
     start: State,
     inputs: Signal | None,
+    rtol: float,
 ) -> Trajectory:
     """Feedback and inputs act continuously: the integrator may take long steps.
 
@@ -95,7 +96,7 @@ def integrate_continuous(
 
     state = np.concatenate([start.positions.ravel(), start.velocities.ravel()])
     times = start.time + timestep * np.arange(steps + 1, dtype=np.float64)
-    states, _ = _solve(body, push, state, times, RTOL, None)
+    states, _ = _solve(body, push, state, times, rtol, None)
     positions = states[:-1, : body.positions.size].reshape(-1, *body.positions.shape)
     lengths = spring_lengths(positions, body.springs)
     return _trajectory(body, lengths, states[-1], readout, timestep, start)

@@ -91,6 +91,7 @@ def integrate_smooth(
     inputs: Signal | None = None,
     w_out: object = None,
     initial_state: State | None = None,
+    rtol: float = RTOL,
 ) -> Trajectory:
     """DOP853 with feedback and inputs acting continuously, Eq. (6) as written.
 
@@ -99,15 +100,16 @@ def integrate_smooth(
     Args:
         steps: samples to record, 1 ms apart.
         inputs: a smooth function of time [s] -> (n_inputs,).
-        w_out, initial_state: as for `integrate`.
+        w_out, initial_state, rtol: as for `integrate`.
 
     Raises:
         DivergenceError, InvalidArgumentError: as for `integrate`.
     """
     require_count("steps", steps, 1, MOST_STEPS)
+    require_number("rtol", rtol, SMALLEST_RTOL, 1e-2)
     readout = Readout.of(w_out, body.n_springs, body.n_outputs)
     return integrate_continuous(
-        body, steps, readout, 1e-3, _checked_state(body, initial_state), inputs
+        body, steps, readout, 1e-3, _checked_state(body, initial_state), inputs, rtol
     )
 
 

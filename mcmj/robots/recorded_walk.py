@@ -25,6 +25,7 @@ def record_walk(
     pose: Callable[[Array], Array],
     *,
     impulses: Mapping[str, Array] | None = None,
+    told: float | None = None,
     n_outputs: int = len(LEGS),
     joints: bool = False,
 ) -> Walk:
@@ -36,6 +37,7 @@ def record_walk(
         pose: position and orientation of the trunk (.., 7) from qpos (.., nq).
         impulses: on bodies (3,) or (copies, 3) [N s], by constant forces over the first
             PUSH_DURATION, in whole samples.
+        told: the robot's one input, held.
         n_outputs: so many, the first, are kept.
         joints: keep all joints, for videos.
 
@@ -55,9 +57,10 @@ def record_walk(
     parts = []
     for samples, acting in ((pushed, forces), (count - pushed, None)):
         if samples > 0:
+            steps = samples * every
             run = robot.stream(
-                samples * every, forces=acting, record=("outputs", "qpos", "sensordata"),
-                chunk=chunk,
+                steps, None if told is None else np.full((steps, 1), told), forces=acting,
+                record=("outputs", "qpos", "sensordata"), chunk=chunk,
             )  # fmt: skip
             parts += [part.thinned(every) for part in run]
     whole = join(parts)
@@ -72,6 +75,7 @@ def record_walk(
         outputs=outputs[..., :n_outputs],
         contact=sensors[..., _places(robot, "_contact")],
         power=np.maximum(power, 0.0).sum(axis=-1),
+        net=power.sum(axis=-1),
         joints=qpos if joints else None,
     )
 

@@ -25,6 +25,7 @@ class Walk:
         outputs: (copies, T, n_legs) x_i.
         contact: (copies, T, n_legs) force of the ground on each foot [N].
         power: (copies, T) positive mechanical power of all servos [W].
+        net: (copies, T) the same, what they take back taken off.
         joints: (copies, T, nq) all of MuJoCo's qpos, if asked for.
     """
 
@@ -33,6 +34,7 @@ class Walk:
     outputs: Array
     contact: Array
     power: Array
+    net: Array
     joints: Array | None = None
 
     @property
@@ -52,14 +54,14 @@ class Walk:
         joints = None if self.joints is None else self.joints[:, first:]
         return Walk(
             self.times[first:], self.trunk[:, first:], self.outputs[:, first:],
-            self.contact[:, first:], self.power[:, first:], joints,
+            self.contact[:, first:], self.power[:, first:], self.net[:, first:], joints,
         )  # fmt: skip
 
 
 def joined(parts: Sequence[Walk]) -> Walk:
     """One walk from consecutive ones of the same sampling."""
     step = parts[0].sample
-    fields = ("trunk", "outputs", "contact", "power", "joints")
+    fields = ("trunk", "outputs", "contact", "power", "net", "joints")
     arrays: dict[str, Any] = {}
     for name in fields:
         pieces = [getattr(part, name) for part in parts]
@@ -110,10 +112,24 @@ def costs_of_transport(walk: Walk, weight: float) -> Array:
     return found
 
 
+def headings(trunk: Array) -> Array:
+    """Angles (.., T) [rad] of the trunk's x axis in the ground's plane, by its poses (.., T, 7)."""
+    w, x, y, z = np.moveaxis(trunk[..., 3:], -1, 0)
+    found: Array = np.unwrap(np.arctan2(2 * (w * z + x * y), 1 - 2 * (y**2 + z**2)), axis=-1)
+    return found
+
+
+def way_ahead(walk: Walk) -> Array:
+    """Distance (copies,) [m] along the heading, which may turn; negative backwards."""
+    heading = headings(walk.trunk)[:, :-1]
+    steps = np.diff(walk.trunk[..., :2], axis=1)
+    found: Array = (steps[..., 0] * np.cos(heading) + steps[..., 1] * np.sin(heading)).sum(axis=1)
+    return found
+
+
 def turns(walk: Walk) -> Array:
     """By how much the heading changes (copies,) [rad], left positive."""
-    w, x, y, z = np.moveaxis(walk.trunk[..., 3:], -1, 0)
-    heading = np.unwrap(np.arctan2(2 * (w * z + x * y), 1 - 2 * (y**2 + z**2)), axis=-1)
+    heading = headings(walk.trunk)
     found: Array = heading[:, -1] - heading[:, 0]
     return found
 

@@ -47,6 +47,12 @@ def named_target(task: str, *others: str) -> Target:
     raise UnknownNameError("task", task, [*NAMES, *others, *OWN])
 
 
+def named_targets(task: str) -> dict[str, Target]:
+    """Targets by name: that of a task, or with "all" the three of the paper."""
+    tasks = tuple(TARGETS) if task == "all" else (task,)
+    return {one.name: one for one in (named_target(each, "all") for each in tasks)}
+
+
 def require_outputs(body: Driven, wanted: Target, name: str = "body") -> None:
     """Raise InvalidArgumentError unless a body or reservoir has as many outputs as a target."""
     if not isinstance(wanted, Target):

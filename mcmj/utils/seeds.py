@@ -33,6 +33,8 @@ PURPOSES = (
     "walk_pushes",
     "channel_gains",
     "kicks",
+    "body_design",
+    "random_search",
 )
 
 

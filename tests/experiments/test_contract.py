@@ -14,9 +14,9 @@ from mcmj.experiments.registry import GROUPS, entries, experiment_named
 from mcmj.utils.errors import UnknownNameError
 from mcmj.utils.files import plain
 
-TAUGHT = (
-    "--task quadratic --seed 0 --nodes 12 --engine twin --duration 12 --washout 4 --rest-runs 0"
-)
+ON_CYCLE = "--rest-runs 0 --held-runs 0"
+UNPRACTISED = "--rounds 0 --trial 13 --trial-window 12"
+TAUGHT = f"--task quadratic --seed 0 --nodes 12 --engine twin --duration 12 --washout 4 {ON_CYCLE}"
 TINY = {
     "adopt": "--model soft_arm --seeds 1 --periods 5 --rounds 0 --free-run 4 --after 4 --window 3 "
     "--symbols 200 --streams 3",
@@ -25,33 +25,40 @@ TINY = {
     "--stream-symbols 12 --no-maps",
     "certify": "--task quadratic --body quadratic --free-run 15 --window 13 --recovery 22 "
     "--scales 1 --phases 1 --kicks 0.5 --pushes 1 --copies 4 --refine 2",
+    "design": "--nodes 6 --seeds 2 --evaluations 3 --checks 1 --judged 1 --free-run 26 --duration "
+    "12 --washout 4 --parts bodies smallest --sizes 4 --workers 1",
     "drive": "--nodes 8 --rounds 1 --population 2 --elites 2 --time-limit 8 --drive 4",
     "emulate": "--targets van_der_pol --integrators Euler --steps-ms 1 2 --horizon 1",
     "filters": "--tasks volterra --nodes 10 --train 3 --washout 1 --test 2 --engine twin",
     "gaits": "--gaits trot pace --seed 3 --nodes 12 --engine twin --duration 10 --washout 4 "
     "--free-run 8 --before 5 --after 10 --from-rest 8 --window 8 --rounds 0 --phases 2",
     "guided": "--experiment limit_cycle --vary teaching.noise=log(0.05,0.5) --set task=quadratic "
-    "settings.nodes=12 teaching.duration=12.0 teaching.washout=4.0 free_run=14.0 window=12.0 "
+    "settings.nodes=12 teaching.duration=12.0 teaching.washout=4.0 teaching.rest_runs=0 "
+    "teaching.held_runs=0 practice.rounds=0 free_run=14.0 window=12.0 "
     "--settings 3 --bodies 1 --judged 1 --confirm 0 --workers 1",
     "hard_cases": "--cases ordinary --integrators Euler --duration 0.05 --most-steps 200",
     "input_driven": "--engine twin --seed 1 --nodes 15 --free-run 14 --window 13 --sweep 0 "
     "--rounds 0 --inputs 1 --curve 2",
     "limit_cycle": "--task quadratic --seed 3 --nodes 12 --duration 8 --washout 2 --free-run 13 "
-    "--window 12 --no-measure-cost",
+    f"--window 12 --no-measure-cost {ON_CYCLE} {UNPRACTISED}",
     "linearise": "--sizes 2 --memory-sizes 2 --diversities 1 0.1 --train 5 --test 2 --washout 1 "
     "--symbolic-masses 2",
-    "perturb": f"{TAUGHT} --before 1 --window 1 --after 15 --error-window 12 --noise-curve 0.1",
+    "perturb": f"{TAUGHT} {UNPRACTISED} --before 1 --window 1 --after 15 --error-window 12 "
+    "--noise-curve 0.1",
     "prune": f"{TAUGHT} --free-run 20 --window 12 --counts 3 10 --starts 1",
     "render": "--duration 0.3 --formats png --stills 1",
     "search": "--seeds 2 --set task=quadratic settings.nodes=12 teaching.duration=12.0 "
-    "teaching.washout=4.0 free_run=14.0 window=12.0 --confirm 1 --audit 1 --cost-trials 2 "
+    "teaching.washout=4.0 teaching.rest_runs=0 teaching.held_runs=0 practice.rounds=0 "
+    "free_run=14.0 window=12.0 --confirm 1 --audit 1 --cost-trials 2 "
     "--workers 1",
     "speed_accuracy": "--bodies toolbox_n10 --methods mujoco_Euler mujoco_RK4 --steps-ms 1 2 "
     "--repeats 1 --no-attractor",
     "success_rate": "--seeds 2 --nodes 10 --duration 6 --washout 2 --free-run 20 --window 19 "
-    "--engine twin",
-    "swing_up": f"{TAUGHT} --free-run 15 --window 12 --kicks 1 --rounds 0 --trial 13 "
-    "--trial-window 12",
+    f"--engine twin {ON_CYCLE} {UNPRACTISED}",
+    "swing_up": f"{TAUGHT} {UNPRACTISED} --free-run 15 --window 12 --kicks 1",
+    "soft_robot": (
+        "--gaits trot --parts energy --walking 3 --judged 1 --rounds 1 --round-duration 3 --trial 1"
+    ),
     "trunk": "--gaits trot --parts --walking 3 --judged 1 --rounds 1 --round-duration 4 --trial 2",
     "walk": "--parts walk --gaits trot --settle 2 --walking 3 --before 2 --after 2",
 }
@@ -62,6 +69,7 @@ TINY["fit"] = " ".join(
 APART = {"reproduce", "view", "web"}  # commands, a person, npm; tested on their own
 TIMED = {  # metrics that are times, by path; all others are the same in every run
     "benchmark": ("*",),
+    "design": ("*/seconds_per_body",),
     "guided": ("*per_second",),
     "render": ("*_ms",),
     "search": ("trials_per_second", "overhead_fraction"),

@@ -20,6 +20,7 @@ from mcmj.utils.files import only_run
 
 SHORT = ["--task", "quadratic", "--seed", "3", "--nodes", "12", "--duration", "30", "--washout"]
 SHORT += ["10", "--window", "12", "--no-measure-cost", "--no-video", "--quiet"]
+SHORT += ["--rest-runs", "0", "--held-runs", "0", "--rounds", "0"]
 BUSY = "another run is at work in the output folder"
 
 

@@ -43,8 +43,8 @@ def options_of(name, task):
 
 def test_the_commands_that_take_a_task():
     assert set(WITH_TASK) == {
-        "adopt", "certify", "drive", "limit_cycle", "perturb", "prune", "render", "success_rate",
-        "swing_up",
+        "adopt", "certify", "design", "drive", "limit_cycle", "perturb", "prune", "render",
+        "success_rate", "swing_up",
     }  # fmt: skip
 
 
@@ -78,7 +78,7 @@ def test_a_python_name_is_a_task_and_a_wrong_one_an_error(name, place, monkeypat
 def test_a_body_taught_by_ones_own_target_is_found_taught(place, tmp_path, capsys):
     task = ["--task", str(place / "mine.csv"), "--no-video", "--quiet"]
     short = ["--duration", "8", "--washout", "2", "--free-run", "13", "--window", "12"]
-    short += ["--no-measure-cost"]
+    short += ["--no-measure-cost", "--rest-runs", "0", "--held-runs", "0", "--rounds", "0"]
     main(["limit_cycle", *task, *short, "--nodes", "12", "--out", str(tmp_path / "one")])
     body = str(tmp_path / "one" / "body.xml")
     assert list(open_body(body).readouts) == ["mine"]

@@ -3,15 +3,20 @@
 import json
 import signal
 import time
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from commands import run, start
 
 import mcmj
+from mcmj.core.random_body import draw_body
+from mcmj.learning.recipe import BODIES
 from mcmj.mjcf.read import load_model, provenance_of_model, readouts_of_model
 
 SHORT = ["--duration", "8", "--washout", "2", "--free-run", "13", "--window", "12", "--no-video"]
+ON_CYCLE = ["--rest-runs", "0", "--held-runs", "0", "--rounds", "0"]
+SHORT += ON_CYCLE
 
 
 def metrics_of(folder):
@@ -46,7 +51,7 @@ def test_limit_cycle_writes_everything(limit_cycle):
         assert arrays["quadratic/outputs"].shape == (13_000, 2)
         assert json.loads(str(arrays["provenance"]))["seed"] == 3
     body, w_out = mcmj.from_mjcf(folder / "body.xml")
-    assert body == mcmj.random_body(3, 12)
+    assert body == draw_body(3, replace(BODIES, nodes=12))
     model = load_model(folder / "body.xml")
     assert np.array_equal(readouts_of_model(model)["quadratic"], w_out)
     assert provenance_of_model(model)["config"]["seed"] == 3
@@ -117,7 +122,7 @@ def test_an_interrupt_leaves_nothing_half_written(tmp_path):
 @pytest.mark.slow
 def test_success_rate(tmp_path):
     options = ["--seeds", "2", "--seed", "5", "--nodes", "10", "--duration", "6"]
-    options += ["--washout", "2", "--free-run", "20", "--quiet", "--out", tmp_path]
+    options += ["--washout", "2", "--free-run", "20", *ON_CYCLE, "--quiet", "--out", tmp_path]
     status, _, err = run("success_rate", *options)
     assert status == 0, err
     document = metrics_of(tmp_path)
@@ -125,7 +130,7 @@ def test_success_rate(tmp_path):
     assert document["metrics"]["all_tasks"]["of"] == 2
     body, w_out = mcmj.from_mjcf(tmp_path / "best.xml")
     assert w_out is None
-    assert body == mcmj.random_body(document["metrics"]["best_seed"], 10)
+    assert body == draw_body(document["metrics"]["best_seed"], replace(BODIES, nodes=10))
 
 
 @pytest.mark.slow
@@ -228,11 +233,11 @@ def test_capacity(tmp_path):
 @pytest.mark.slow
 def test_perturb_and_swing_up(tmp_path):
     taught = ["--task", "quadratic", "--seed", "0", "--nodes", "12", "--engine", "twin"]
-    taught += ["--duration", "12", "--washout", "4", "--rest-runs", "0"]
+    taught += ["--duration", "12", "--washout", "4", *ON_CYCLE]
     runs = {
         "perturb": (["--before", "1", "--window", "1", "--after", "15", "--error-window", "12",
                      "--noise-curve", "0.1"], "frozen_x1", "recovery_time"),
-        "swing_up": (["--free-run", "15", "--window", "12", "--kicks", "1", "--rounds", "0",
+        "swing_up": (["--free-run", "15", "--window", "12", "--kicks", "1",
                       "--trial", "13", "--trial-window", "12"], "tasks", "quadratic"),
     }  # fmt: skip
     for name, (options, key, inner) in runs.items():
@@ -303,6 +308,31 @@ def test_all_parts_of_trunk(tmp_path):
     assert set(metrics["switch"]["trot"]) == {"bound"}
     same = metrics["steps"]["trot"]["1"]  # the walk again
     assert same["orbit_error"] == pytest.approx(metrics["trot"]["orbit_error"], rel=0.2)
+
+
+@pytest.mark.slow
+def test_all_parts_of_soft_robot(tmp_path):
+    """Every part says something of every gait; seconds of learning are too few for more."""
+    options = ["--gaits", "trot", "bound", "--no-video", "--walking", "4", "--judged", "2"]
+    options += ["--rounds", "1", "--round-duration", "6", "--trial", "3", "--survive", "1.5"]
+    options += ["--teaching", "5", "--pushes", "1", "--impulses", "10"]
+    status, _, err = run("soft_robot", *options, "--steps-ms", "0.2", "--out", tmp_path)
+    assert status == 0, err
+    metrics = metrics_of(tmp_path)["metrics"]
+    for name in ("trot", "bound"):
+        assert metrics[name]["upright"] == metrics[name]["of"] == 1
+        assert metrics[name]["speed_m_s"] > 0.1
+        assert metrics["energy"][name]["balance_error"] < 1e-3
+        assert metrics["push"]["survived"][name]["10"] == 2
+        assert metrics["controls"][name]["frozen"]["speed_m_s"] == pytest.approx(0.0, abs=0.05)
+        assert set(metrics["ground"][name]) == {
+            "slope -0.05", "slope -0.02", "slope 0.02", "slope 0.05", "step 10 mm", "step 20 mm",
+        }  # fmt: skip
+    assert set(metrics["switch"]) == {"trot_to_bound", "bound_to_trot"}
+    assert len(metrics["steer"]["robots"][0]["told"]) >= 7
+    assert (tmp_path / "soft_robot.png").stat().st_size > 10_000
+    with np.load(tmp_path / "readouts.npz") as arrays:
+        assert arrays["bound/w_out"].shape[1] == 12
 
 
 @pytest.mark.slow

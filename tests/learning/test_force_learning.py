@@ -5,7 +5,7 @@ import pytest
 
 import mcmj
 from mcmj.learning.force_learning import ForceLearning, force_learn
-from mcmj.learning.trial import trial_error
+from mcmj.learning.free_run import trial_error
 from mcmj.metrics.orbits import orbit_error
 from mcmj.targets.limit_cycles import target
 from mcmj.utils.errors import DivergenceError, InvalidArgumentError
@@ -95,10 +95,13 @@ def test_after_a_trial_that_fails_the_teacher_leads_again_from_the_start():
         simulation.reset()
         stood.append(simulation.time)
 
-    learned = force_learn(
-        simulation, target("quadratic"), SHORT, seed=1, stand=stand,
-        failed=lambda run: len(stood) == 1 and run.get("qpos").shape[1] == 10,
-    )  # fmt: skip
+    def judge():
+        return trial_error(
+            simulation, target("quadratic"), SHORT.trial,
+            lambda run: len(stood) == 1 and run.get("qpos").shape[1] == 10,
+        )  # fmt: skip
+
+    learned = force_learn(simulation, target("quadratic"), SHORT, seed=1, stand=stand, judge=judge)
     assert len(stood) == 2
     assert np.isinf(learned.errors[0])
     assert learned.errors[1] < 0.05

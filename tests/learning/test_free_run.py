@@ -9,6 +9,7 @@ from mcmj import Teaching
 from mcmj.core.random_body import BodySettings
 from mcmj.experiments.limit_cycle import run as limit_cycle
 from mcmj.learning import free_run
+from mcmj.learning.practice import Practice
 from mcmj.metrics.orbits import orbit_error
 from mcmj.simulation import simulation
 from mcmj.targets.limit_cycles import target
@@ -23,6 +24,7 @@ CONFIG = limit_cycle.Config(
     timestep=2e-3,
     settings=BodySettings(nodes=12),
     teaching=Teaching(duration=30.0, washout=10.0),
+    practice=Practice(rounds=0, trial=12.0, trial_window=10.0),
 )
 
 
@@ -63,8 +65,8 @@ def test_an_interrupted_run_goes_on_bit_for_bit(small_chunks, tmp_path, parts):
         assert np.array_equal(getattr(again, name), getattr(whole, name)), name
     assert dataclasses.replace(again.fit, w_out=None) == dataclasses.replace(whole.fit, w_out=None)
     assert again.errors == whole.errors
-    assert sum(counted) == 30_000
-    assert counted[0] >= 15_000 + 1000 * (parts - 1)  # nothing taught or run twice
+    assert sum(counted) == 36_000
+    assert counted[0] >= 21_000 + 1000 * (parts - 1)  # nothing taught or run twice
     for checkpoint in kept.values():
         checkpoint.remove()
     assert not list(tmp_path.iterdir())

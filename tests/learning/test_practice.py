@@ -16,7 +16,7 @@ from mcmj.utils.errors import DivergenceError, InvalidArgumentError
 from mcmj.utils.seeds import stream
 
 STEP = 2e-3
-TAUGHT = Teaching(duration=20.0, washout=5.0, rest_runs=1, rest_duration=5.0, noise=0.1)
+TAUGHT = Teaching(duration=20.0, washout=5.0, rest_runs=1, away_duration=5.0, noise=0.1)
 SHORT = Practice(rounds=2, round_runs=1, round_duration=5.0, trial=15.0, trial_window=12.0)
 
 
@@ -141,7 +141,7 @@ def test_bad_settings_are_named(name, value):
 def test_practice_makes_a_body_swing_up_that_teaching_alone_does_not():
     """Seed 10: Van der Pol from rest ends elsewhere after teaching alone."""
     goal = target("van_der_pol")
-    taught = Teaching(duration=120.0, rest_runs=2, rest_duration=30.0, rest_weight=1e-2)
+    taught = Teaching(duration=120.0, rest_runs=2)
     course = Course(Simulation(random_body(10), engine="twin"), taught, seed=0)
     course.attend_all(lessons_of(goal, taught))
     practised = practise(course, goal, Practice())

@@ -1,6 +1,7 @@
 """Teacher forcing: the regression it does, its noise, its memory, and that it works."""
 
 import tracemalloc
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -9,8 +10,8 @@ import twins
 import mcmj
 from mcmj import Simulation, Teaching, fit_readout, teach
 from mcmj.learning import teaching
-from mcmj.learning.lessons import Lesson
-from mcmj.learning.teaching import synchronise
+from mcmj.learning.lessons import Lesson, TeacherNoise
+from mcmj.learning.teaching import held_outputs, synchronise
 from mcmj.metrics.orbits import orbit_error
 from mcmj.targets.limit_cycles import from_array, target
 from mcmj.utils.errors import InvalidArgumentError
@@ -66,6 +67,39 @@ def test_some_outputs_may_be_fed_back_without_noise(body, goal):
     for share in ((1.0, 0.0, 1.0), (-1.0, 0.0)):
         with pytest.raises(InvalidArgumentError, match="noise_share: expected"):
             course.attend(Lesson(goal.sample, 3.0, noise_share=share))
+
+
+def test_slow_noise_is_an_ornstein_uhlenbeck_process():
+    """Its variance, and its correlation exp(-t / drift_time), from many parts of a long run."""
+    settings = Teaching(noise=0.0, drift=0.3, drift_time=0.5)
+    noise = TeacherNoise(settings, np.random.default_rng(0), 2, STEP)
+    values = np.concatenate([noise.take(steps) for steps in (1, 700, 400_000)])
+    assert values.std() == pytest.approx(0.3, rel=0.05)
+    for lag in (0.25, 0.5, 1.0):
+        k = round(lag / STEP)
+        correlation = (values[k:] * values[:-k]).mean() / values.var()
+        assert correlation == pytest.approx(np.exp(-lag / 0.5), abs=0.05)
+
+
+def test_runs_from_where_constants_held_the_body_are_weighted_rows(body, goal):
+    """As by hand: HELD seconds of each constant, which are not learnt, then the target."""
+    settings = replace(BRIEF, noise=0.0, held_runs=2, away_duration=1.0, away_weight=0.1)
+    fit, _ = taught(body, goal, settings)
+    plain, rows = Simulation(body, timestep=STEP), []
+    held = held_outputs(goal, 2)
+    assert (np.abs(held) < 1.5 * np.abs(goal.orbit(4096)).max(axis=0)).all()
+    for outputs, seconds, skipped, weight in ((held[0], 11, 10, 0.1), (held[1], 11, 10, 0.1),
+                                              (None, 6, 2, 1.0)):  # fmt: skip
+        first = round(plain.time / STEP)
+        clean = goal.sample(STEP * np.arange(first, first + round(seconds / STEP)))
+        fed, kept = clean.copy(), slice(round(skipped / STEP), None)
+        if outputs is not None:
+            fed[: kept.start] = outputs
+        lengths = plain.rollout(offset=fed, gate=0.0).lengths
+        rows.append(np.sqrt(weight) * np.hstack([lengths, clean])[kept])
+    x, y = np.split(np.vstack(rows), [body.n_springs], axis=1)
+    w = np.linalg.lstsq(x, y)[0]
+    assert np.abs(x @ (fit.w_out - w)).max() < 1e-7
 
 
 def test_same_seed_same_bits(body, goal):

@@ -5,9 +5,10 @@ import pytest
 
 from mcmj.experiments.trunk.result import forward_speed
 from mcmj.learning.force_learning import ForceLearning, force_learn
+from mcmj.learning.free_run import trial_error
 from mcmj.metrics.orbits import orbit_error
 from mcmj.robots.quadruped import GRAVITY
-from mcmj.robots.trunk import N_MUSCLES, TrunkSettings, draw_trunk, muscle_lengths, muscle_target
+from mcmj.robots.trunk import TrunkSettings, draw_trunk, muscle_lengths, muscle_target
 from mcmj.robots.trunk_walker import has_fallen, new_robot, stand, walk
 from mcmj.robots.walk_metrics import fall_times, speeds
 from mcmj.targets.gaits import LEGS, POINTS, gait_target
@@ -22,7 +23,7 @@ def trunk():
 @pytest.fixture(scope="module")
 def lively(trunk):
     """A readout that keeps the muscles moving: in free fall nothing else does."""
-    return 0.3 * np.random.default_rng(1).normal(size=(trunk.n_sensed + 1, N_MUSCLES))
+    return 0.3 * np.random.default_rng(1).normal(size=(trunk.n_sensed + 1, trunk.n_muscles))
 
 
 def nodes_of(trunk, walked):
@@ -96,8 +97,8 @@ def test_muscles_of_these_lengths_meet_where_the_foot_is_wanted(trunk):
     """By the law of cosines, from the two upper ends."""
     rng = np.random.default_rng(0)
     swing, lift = rng.uniform(-1, 1, (5, 4)), rng.uniform(0, 1, (5, 4))
-    lengths = trunk.body.rest_lengths[-N_MUSCLES:] + muscle_lengths(trunk, swing, lift)
-    muscles = trunk.body.springs[-N_MUSCLES:]
+    lengths = trunk.body.rest_lengths[trunk.n_sensed :] + muscle_lengths(trunk, swing, lift)
+    muscles = trunk.body.springs[trunk.n_sensed :]
     for leg in range(len(LEGS)):
         (fore, foot), (rear, _) = muscles[2 * leg : 2 * leg + 2]
         a, b = trunk.body.positions[fore], trunk.body.positions[rear]
@@ -150,7 +151,7 @@ def test_a_target_of_muscles_is_a_gait_at_its_pace(trunk):
     assert target.period == pytest.approx(gait_target("trot").period / 11.0, rel=1e-12)
     swing = gait_target("trot").orbit(POINTS)[::100]
     wanted = target.orbit(POINTS)[::100]
-    assert wanted.shape == (len(swing), N_MUSCLES)
+    assert wanted.shape == (len(swing), trunk.n_muscles)
     down = np.gradient(gait_target("trot").orbit(POINTS), axis=0)[::100] < -1e-5
     still = muscle_lengths(trunk, swing, np.zeros_like(swing))
     assert np.abs((wanted - still)[np.repeat(down, 2, axis=1)]).max() < 1e-9
@@ -177,7 +178,8 @@ def test_it_learns_to_trot_starts_from_rest_and_does_not_depend_on_the_step():
     target, robot = muscle_target(trunk, "trot", 11.0), new_robot(trunk)
     learned = force_learn(
         robot, target, ForceLearning(rounds=1), seed=1,
-        stand=lambda: stand(robot), failed=has_fallen(trunk),
+        stand=lambda: stand(robot),
+        judge=lambda: trial_error(robot, target, 20.0, has_fallen(trunk)),
     )  # fmt: skip
     errors, paces = [], []
     for timestep in (1e-3, 5e-4):

@@ -236,7 +236,7 @@ def made_up(trunk, **arrays):
     """A walk of one copy with these poses (T, 7), sampled every 10 ms."""
     n = len(trunk)
     given = {"outputs": np.zeros((1, n, 4)), "contact": np.zeros((1, n, 4)),
-             "power": np.zeros((1, n))} | arrays  # fmt: skip
+             "power": np.zeros((1, n)), "net": np.zeros((1, n))} | arrays  # fmt: skip
     return Walk(0.01 * np.arange(1, n + 1), trunk[None], **given)
 
 
@@ -267,7 +267,7 @@ def test_phase_shift_and_recovery_of_made_up_rhythms():
     times = 0.01 * np.arange(1, 801)
     ahead = np.stack([np.sin(2 * np.pi * (times + lead)) for lead in (0.0, 0.1)])
     walk = Walk(times, np.zeros((2, 800, 7)), np.repeat(ahead[..., None], 4, axis=2),
-                np.zeros((2, 800, 4)), np.zeros((2, 800)))  # fmt: skip
+                np.zeros((2, 800, 4)), *np.zeros((2, 2, 800)))  # fmt: skip
     assert phase_shift(walk, 1.0, 1) == pytest.approx(0.1, abs=1e-6)
     circle = np.column_stack([np.cos(2 * np.pi * times), np.sin(2 * np.pi * times)])
     kicked = circle * (1 + 0.5 * np.exp(-times))[:, None]

@@ -3,6 +3,7 @@
 import json
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,10 +11,12 @@ import pytest
 from searches import SET, tiny_trials
 
 import mcmj
+from mcmj.core.random_body import draw_body
 from mcmj.experiments.guided import run as guided
 from mcmj.experiments.limit_cycle import run as limit_cycle
 from mcmj.experiments.search import run as search
 from mcmj.experiments.search.cost import affordable, overhead
+from mcmj.learning.recipe import BODIES
 from mcmj.mjcf.read import load_model, provenance_of_model, readouts_of_model
 from mcmj.search.experiment import evaluate
 from mcmj.search.study import Study
@@ -65,7 +68,7 @@ def test_the_best_body_is_written_with_its_readout(result):
     account = provenance_of_model(model)
     body, w_out = mcmj.from_mjcf(result.bodies[0])
     fraction = row["setting"]["settings.feedback_fraction"]
-    assert body == mcmj.random_body(row["seed"], 6, feedback_fraction=fraction)
+    assert body == draw_body(row["seed"], replace(BODIES, nodes=6, feedback_fraction=fraction))
     assert np.array_equal(readouts_of_model(model)["quadratic"], w_out)
     assert (account["screened"], account["confirmed"]) == (row["score"], row["confirmed_score"])
     assert account["config"]["engine"] == "mujoco"
@@ -241,7 +244,7 @@ def test_the_script_writes_everything(tmp_path):
                  "twin_mujoco_agreement", "best"):  # fmt: skip
         assert document["metrics"][name] is not None
     seed = document["metrics"]["best"]["seed"]
-    assert mcmj.from_mjcf(tmp_path / "best.xml")[0] == mcmj.random_body(seed, 6)
+    assert mcmj.from_mjcf(tmp_path / "best.xml")[0] == draw_body(seed, replace(BODIES, nodes=6))
     assert len((tmp_path / "trials.csv").read_text().splitlines()) == 1 + 9 + 3
 
 

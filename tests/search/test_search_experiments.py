@@ -25,10 +25,12 @@ from mcmj.utils.files import plain
 
 SEEDS = 2
 TWIN = {"engine": "twin", "settings.nodes": 12}
-TAUGHT = {"teaching.duration": 20.0, "teaching.washout": 5.0, "teaching.rest_runs": 0}
+TAUGHT = {"teaching.duration": 20.0, "teaching.washout": 5.0, "teaching.rest_runs": 0,
+          "teaching.held_runs": 0}  # fmt: skip
 PRACTICE = {"practice.rounds": 1, "practice.round_duration": 5.0, "practice.trial": 12.0,
             "practice.trial_window": 10.0}  # fmt: skip
-PERTURB = {**TWIN, **TAUGHT, "before": 1.0, "window": 1.0, "after": 16.0, "error_window": 12.0}
+PERTURB = {**TWIN, **TAUGHT, **PRACTICE, "before": 1.0, "window": 1.0, "after": 16.0,
+           "error_window": 12.0}  # fmt: skip
 SWING_UP = {**TWIN, **TAUGHT, **PRACTICE, "task": "quadratic", "free_run": 15.0, "window": 12.0}
 GAITS = {**TWIN, **TAUGHT, **PRACTICE, "gaits": ["trot", "bound"], "free_run": 10.0,
          "before": 1.0, "after": 10.0, "from_rest": 10.0, "window": 10.0, "phases": 1}  # fmt: skip

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from mcmj.experiments.limit_cycle import config as limit_cycle_config
 from mcmj.experiments.perturb import run as perturb
 from mcmj.experiments.swing_up import run as swing_up
+from mcmj.learning.recipe import TEACHING
 from mcmj.search.overrides import override, parse_assignment, value_at
 from mcmj.search.space import Choices, Range, expand, parse_dimension
 from mcmj.search.summary import success_by_setting
@@ -88,7 +89,7 @@ def test_a_wrong_override_is_named(changes, error, text):
 def test_fields_that_depend_on_each_other_change_together():
     # one by one, either order passes through a washout longer than the lesson
     config = override(CONFIGS[0], {"teaching.duration": 300.0, "teaching.washout": 200.0})
-    back = override(config, {"teaching.washout": 20.0, "teaching.duration": 120.0})
+    back = override(config, {"teaching.washout": 20.0, "teaching.duration": TEACHING.duration})
     assert back == CONFIGS[0]
 
 

@@ -9,6 +9,11 @@ TINY = {
     "window": 12.0,
     "teaching.duration": 3.0,
     "teaching.washout": 1.0,
+    "teaching.rest_runs": 0,
+    "teaching.held_runs": 0,
+    "practice.rounds": 0,
+    "practice.trial": 12.0,
+    "practice.trial_window": 10.0,
     "settings.nodes": 6,
 }
 SET = tuple(f"{path}={value}" for path, value in TINY.items() if path != "engine")

@@ -16,6 +16,7 @@ except MissingExtraError as error:
     print(error)
 """
 STUDY = "from mcmj.search.study import Study; Study('s', {}, {'x': 1}, 0, startup=1, maximise=True)"
+EVOLUTION = "from mcmj.search.evolution import Evolution; Evolution(2, 0, spread=1.0, bound=2.0)"
 
 
 @pytest.mark.slow
@@ -33,6 +34,7 @@ STUDY = "from mcmj.search.study import Study; Study('s', {}, {'x': 1}, 0, startu
         ("gymnasium", "gym", "import mcmj.learning.environments.gymnasium_env"),
         ("sklearn", "sklearn", "import mcmj.learning.estimator"),
         ("optuna", "search", STUDY),
+        ("cmaes", "design", EVOLUTION),
         ("pyarrow", "search", "import mcmj.search.export as e; e.write_parquet(None, 't.parquet')"),
         ("distributed", "cluster", "import mcmj.search.workers as w; w.Cluster('tcp://h:1')"),
     ],

@@ -1,10 +1,12 @@
 """What the certificate runs: its Config."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 from mcmj.analysis.stability.loop import INTEGRATOR
 from mcmj.experiments.limit_cycle import config as limit_cycle
 from mcmj.learning.lessons import Teaching
+from mcmj.learning.practice import Practice
+from mcmj.learning.recipe import PRACTICE, TEACHING
 from mcmj.metrics import orbits
 from mcmj.targets.named import named_target
 from mcmj.utils.validation import (
@@ -38,6 +40,7 @@ class Config:
         refine: steps so much smaller for a second after a kick, and during a push.
         diffusion_noise: on the lengths, for the phase diffusion [m].
         teaching: how the readout is taught, if it is.
+        practice: how the body then practises from rest.
     """
 
     task: str = "van_der_pol"
@@ -54,7 +57,8 @@ class Config:
     copies: int = 16
     refine: int = 20
     diffusion_noise: float = 1e-4
-    teaching: Teaching = field(default_factory=Teaching)
+    teaching: Teaching = TEACHING
+    practice: Practice = PRACTICE
 
     def __post_init__(self) -> None:
         period = named_target(self.task).period

@@ -18,7 +18,8 @@ from mcmj.experiments.certify.config import Config
 from mcmj.experiments.certify.result import Result
 from mcmj.experiments.limit_cycle import config as limit_cycle
 from mcmj.experiments.limit_cycle.run import cycle_errors
-from mcmj.learning.teaching import synchronise, teach
+from mcmj.learning.recipe import train
+from mcmj.learning.teaching import synchronise
 from mcmj.metrics import orbits
 from mcmj.reference.twin.population import rest as rest_state
 from mcmj.simulation.simulation import Simulation
@@ -66,7 +67,9 @@ def _trained(config: Config, goal: Target) -> _Trained:
     require_outputs(body, goal)
     simulation, w_out = Simulation(body, **stepping), readouts.get(goal.name)
     if w_out is None:
-        w_out = teach(simulation, goal, config.teaching, config.noise_seed).w_out
+        w_out = train(
+            simulation, goal, config.noise_seed, teaching=config.teaching, practice=config.practice
+        ).fit.w_out
     else:
         synchronise(simulation, goal, config.teaching.washout)
         simulation.set_readout(w_out)

@@ -78,6 +78,17 @@ def _of_seed(config: Config, seed: int, lesson: Lesson | None, on_steps: OnSteps
     assert lesson is not None
     start = get_start(config, seed)
     simulation = Simulation(start.body, **start.stepping)
+    return try_out(config, simulation, lesson, seed, on_steps)
+
+
+def try_out(
+    config: Config,
+    simulation: Simulation,
+    lesson: Lesson,
+    seed: int,
+    on_steps: OnSteps = lambda steps: None,
+) -> Outcome:
+    """Teach a body, which keeps the readout, and jump to every input; a blow-up is an outcome."""
     practised = or_lost(lambda: teach(config, simulation, lesson, seed, on_steps), None)
     if practised is None:
         return Outcome(dict.fromkeys(config.inputs, np.inf), ())

@@ -43,6 +43,7 @@ def best_body(config: Config, seeds: SuccessOfSeeds) -> str:
         "orbit_errors": files.plain(errors),
         "free_run": config.free_run,
         "teaching": files.plain(config.teaching),
+        "practice": files.plain(config.practice),
         "versions": files.versions(),
     }
     return to_mjcf(draw_body(seed, config.settings), provenance=provenance)

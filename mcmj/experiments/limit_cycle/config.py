@@ -1,6 +1,6 @@
 """What the limit-cycle experiment runs: its Config, and the body and readouts it asks for."""
 
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, fields, replace
 from typing import Any
 
 from mcmj.core.body import Body
@@ -9,9 +9,11 @@ from mcmj.core.random_body import BodySettings
 from mcmj.experiments.body_source import BodySource
 from mcmj.learning.free_run import WINDOW
 from mcmj.learning.lessons import Teaching
+from mcmj.learning.practice import Practice
+from mcmj.learning.recipe import BODIES, PRACTICE, TEACHING
 from mcmj.metrics import orbits
-from mcmj.targets.limit_cycles import TARGETS, Target
-from mcmj.targets.named import named_target, require_outputs
+from mcmj.targets.limit_cycles import Target
+from mcmj.targets.named import named_targets, require_outputs
 from mcmj.utils.errors import InvalidArgumentError
 from mcmj.utils.validation import (
     Array,
@@ -48,6 +50,7 @@ class Config:
         measure_cost: measure what a step in closed loop costs in MuJoCo.
         settings: what a random body is drawn from.
         teaching: how the readout is taught.
+        practice: how the body then practises from rest.
     """
 
     task: str = "all"
@@ -62,8 +65,9 @@ class Config:
     engine: str = "mujoco"
     windows: float = WINDOW
     measure_cost: bool = True
-    settings: BodySettings = field(default_factory=BodySettings)
-    teaching: Teaching = field(default_factory=Teaching)
+    settings: BodySettings = BODIES
+    teaching: Teaching = TEACHING
+    practice: Practice = PRACTICE
 
     def __post_init__(self) -> None:
         longest = max(wanted.period for wanted in self.targets.values())
@@ -79,8 +83,7 @@ class Config:
     @property
     def targets(self) -> dict[str, Target]:
         """What to learn, by name."""
-        tasks = tuple(TARGETS) if self.task == "all" else (self.task,)
-        return {one.name: one for one in (named_target(task, "all") for task in tasks)}
+        return named_targets(self.task)
 
     @property
     def noise_seed(self) -> int:
@@ -90,8 +93,7 @@ class Config:
     @property
     def source(self) -> BodySource:
         """Of the bodies."""
-        usual = BodySettings()
-        return BodySource(self.body, self.seed, self.seeds, self.settings, usual, "general")
+        return BodySource(self.body, self.seed, self.seeds, self.settings, BODIES, "general")
 
 
 def get_body(config: Config) -> Found:
@@ -118,8 +120,8 @@ def of_seed(config: Any, index: int) -> Config:
 
 
 def total_steps(config: Config) -> int:
-    """Control steps of a whole run, for a progress bar."""
-    seconds = config.teaching.total + config.free_run
+    """Control steps of a whole run, for a progress bar; rounds of practice are not foreseen."""
+    seconds = config.teaching.total + config.practice.trial + config.free_run
     return config.seeds * len(config.targets) * round(seconds / config.timestep)
 
 

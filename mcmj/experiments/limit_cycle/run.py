@@ -14,8 +14,9 @@ from mcmj.experiments.limit_cycle.loop_cost import closed_loop_cost
 from mcmj.experiments.limit_cycle.result import Result, TaskResult
 from mcmj.experiments.limit_cycle.seeds import SuccessOfSeeds
 from mcmj.learning.free_run import free_run, resume, window_errors
+from mcmj.learning.recipe import train
 from mcmj.learning.regression import Fit
-from mcmj.learning.teaching import synchronise, teach
+from mcmj.learning.teaching import synchronise
 from mcmj.metrics import orbits
 from mcmj.mjcf.write import to_mjcf
 from mcmj.simulation.simulation import Simulation
@@ -154,7 +155,8 @@ def _run_task(
         done, fit = None, _ready(simulation, config, wanted, w_out, on_steps)
     else:
         done, fit = resumed
-        on_steps(round(config.teaching.total / config.timestep) + len(done))
+        taught = config.teaching.total + config.practice.trial
+        on_steps(round(taught / config.timestep) + len(done))
     total, last = (round(s / config.timestep) for s in (config.free_run, config.window))
     first = free_run(
         simulation, total - last, done=done, checkpoint=checkpoint, fit=fit, on_steps=on_steps
@@ -191,7 +193,10 @@ def _ready(
 ) -> Fit | None:
     """Teach, or bring onto the target a body that has its readout already."""
     if w_out is None:
-        return teach(simulation, wanted, config.teaching, config.noise_seed, on_steps=on_steps)
+        return train(
+            simulation, wanted, config.noise_seed, teaching=config.teaching,
+            practice=config.practice, on_steps=on_steps,
+        ).fit  # fmt: skip
     synchronise(simulation, wanted, config.teaching.washout)
     simulation.set_readout(w_out)
     return None

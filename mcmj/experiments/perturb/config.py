@@ -1,27 +1,20 @@
 """What the perturbation experiment runs: its Config."""
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 from mcmj.core.random_body import BodySettings
 from mcmj.experiments.body_source import BodySource
 from mcmj.learning.lessons import Teaching
+from mcmj.learning.practice import Practice
+from mcmj.learning.recipe import BODIES, PRACTICE, TEACHING
 from mcmj.metrics import orbits
 from mcmj.simulation.phases import Phase, RandomForces
-from mcmj.targets.named import named_target
+from mcmj.targets.limit_cycles import Target
+from mcmj.targets.named import named_targets
 from mcmj.utils.validation import (
     require_duration,
     require_number,
     require_timestep,
-)
-
-# chosen by the recoveries of bodies 0 to 19 and 100 to 239, on the twin
-DRAWN = BodySettings(nodes=20, feedback_fraction=0.5, d1=(0.1, 2.0))
-TAUGHT = Teaching(
-    noise=0.4,
-    ridge_per_row=1e-6,  # as against a length noise of 1e-3 m
-    rest_runs=2,  # they widen the basin: a frozen output leads far from the orbit
-    rest_duration=30.0,
-    rest_weight=1e-2,
 )
 
 
@@ -30,7 +23,8 @@ class Config:
     """What to run.
 
     Attributes:
-        task: van_der_pol, .., a .csv file or package.module:function.
+        task: van_der_pol, quadratic, lissajous, or all of these (by the same bodies); a .csv file;
+            package.module:function.
         body: a body file, or the name of a body that comes with mcmj; default: a random body.
             It is always taught: readouts in the file are not used. Integrator and spring law
             are the file's, unless the engine is the twin.
@@ -45,7 +39,8 @@ class Config:
         timestep: control and physics step [s].
         engine: mujoco, or twin: faster, the same to rounding.
         settings: what a random body is drawn from.
-        teaching: how the readout is taught; with a ridge it stands 100 x more sensor noise.
+        teaching: how the readout is taught.
+        practice: how the body then practises from rest.
     """
 
     task: str = "quadratic"
@@ -54,7 +49,7 @@ class Config:
     seeds: int = 1
     before: float = 10.0
     window: float = 10.0
-    after: float = 40.0
+    after: float = 80.0
     force: float = 10.0
     sensor_noise: float = 0.1
     noise_curve: tuple[float, ...] = (0.03, 0.1, 0.3, 1.0, 3.0, 10.0)
@@ -62,11 +57,12 @@ class Config:
     error_window: float = 20.0
     timestep: float = 1e-3
     engine: str = "mujoco"
-    settings: BodySettings = DRAWN
-    teaching: Teaching = field(default_factory=lambda: TAUGHT)
+    settings: BodySettings = BODIES
+    teaching: Teaching = TEACHING
+    practice: Practice = PRACTICE
 
     def __post_init__(self) -> None:
-        period = named_target(self.task).period
+        period = max(wanted.period for wanted in self.targets.values())
         self.source  # noqa: B018  checks body, seeds and settings
         require_timestep("timestep", self.timestep)
         for name in ("before", "window", "after"):
@@ -82,7 +78,12 @@ class Config:
     @property
     def source(self) -> BodySource:
         """Of the bodies."""
-        return BodySource(self.body, self.seed, self.seeds, self.settings, DRAWN)
+        return BodySource(self.body, self.seed, self.seeds, self.settings, BODIES)
+
+    @property
+    def targets(self) -> dict[str, Target]:
+        """What to learn, by name."""
+        return named_targets(self.task)
 
     @property
     def perturbations(self) -> dict[str, Phase]:
@@ -91,7 +92,7 @@ class Config:
         return {
             **{
                 f"frozen_x{output + 1}": replace(disturbed, freeze=(output,))
-                for output in range(named_target(self.task).n_outputs)
+                for output in range(next(iter(self.targets.values())).n_outputs)
             },
             "random_forces": replace(disturbed, forces=RandomForces(self.force)),
             "length_noise": replace(disturbed, length_noise=self.sensor_noise),
@@ -102,5 +103,5 @@ def total_steps(config: Config) -> int:
     """Control steps of a whole run, for a progress bar."""
     runs = 1 + len(config.perturbations) + len(config.noise_curve)
     run_length = config.before + config.window + config.after
-    seconds = config.teaching.total + runs * run_length
-    return config.seeds * round(seconds / config.timestep)
+    seconds = config.teaching.total + config.practice.trial + runs * run_length
+    return config.seeds * len(config.targets) * round(seconds / config.timestep)

@@ -1,5 +1,7 @@
 """Disturbed rhythms, in the manner of the paper's Fig. 6; and how much noise is too much."""
 
+from collections.abc import Mapping
+
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -22,24 +24,26 @@ SHOWN = 15.0  # s: the free run after the disturbance is drawn for this long at 
 
 
 def figures(result: Result) -> dict[str, Figure]:
-    """By file name: Fig. 6 of the first body; noise tolerance of all."""
-    found = {"perturb": perturb_figure(result)}
-    if result.config.noise_curve:
-        found["noise_tolerance"] = tolerance_figure(result)
+    """By file name, of each task: Fig. 6 of the first body; noise tolerance of all."""
+    found, targets = {}, result.config.targets
+    for task, wanted in targets.items():
+        before = f"{task}_" if len(targets) > 1 else ""
+        found[f"{before}perturb"] = perturb_figure(result.bodies[0][task].recoveries, wanted)
+        if result.config.noise_curve:
+            found[f"{before}noise_tolerance"] = tolerance_figure(result, task)
     return found
 
 
-def perturb_figure(result: Result) -> Figure:
+def perturb_figure(runs: Mapping[str, Recovery], target: Target) -> Figure:
     """Fig. 6: one row a perturbation; outputs over time, and the phase plane in the same colours.
 
     Where outputs are noisy they are drawn pale, those without noise on top.
     """
-    runs = result.bodies[0].recoveries
     figure = new_figure(12.0, 2.7 * len(runs) + 0.6)
     axes = figure.subplots(len(runs), 2, width_ratios=[3.0, 1.0], squeeze=False)
     for (name, run), (time_axes, plane) in zip(runs.items(), axes, strict=True):
         noisy = name == "length_noise"
-        _draw_run(time_axes, plane, result.target, run, noisy=noisy)
+        _draw_run(time_axes, plane, target, run, noisy=noisy)
         recovery = run.recovery_time
         back = f"back after {recovery:.1f} s" if np.isfinite(recovery) else "not back"
         time_axes.set_title(f"{NAMES.get(name, name)}: {back}")
@@ -82,10 +86,10 @@ def _draw_run(time_axes: Axes, plane: Axes, target: Target, run: Recovery, *, no
         time_axes.set_xlim(times[0], min(times[-1], last_shown))
 
 
-def tolerance_figure(result: Result) -> Figure:
+def tolerance_figure(result: Result, task: str) -> Figure:
     """Orbit error after some time of length noise against its amplitude, a line a body."""
     amplitudes, tolerance = result.config.noise_curve, result.config.tolerance
-    errors = np.array([body.noise_errors for body in result.bodies])
+    errors = np.array([body[task].noise_errors for body in result.bodies])
     figure = new_figure(7.0, 4.0)
     axes = figure.add_subplot()
     capped = np.minimum(errors, 2.0)  # everything worse, blow-ups too, is drawn here

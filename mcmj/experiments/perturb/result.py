@@ -1,15 +1,13 @@
 """How bodies come back from perturbations, and how many of them do."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from mcmj.core.body import Body
 from mcmj.experiments.perturb.config import Config
-from mcmj.learning.regression import Fit
 from mcmj.metrics.success_rates import success_rate
-from mcmj.targets.limit_cycles import Target
 from mcmj.utils.validation import Array
 
 
@@ -34,17 +32,26 @@ class Recovery:
     orbit_error: float
     recovery_time: float
 
+    @property
+    def judged(self) -> "Recovery":
+        """The same without its outputs: those of many bodies would fill the memory."""
+        return replace(LOST, orbit_error=self.orbit_error, recovery_time=self.recovery_time)
+
 
 LOST = Recovery(np.zeros(0), np.zeros((0, 2)), np.zeros((0, 2)), (0,), np.inf, np.inf)
 
 
 @dataclass(frozen=True)
-class BodyResult:
-    """One body under all perturbations; `noise_errors` (amplitudes,) is its tolerance curve."""
+class TaskResult:
+    """One task of one body under all perturbations.
 
-    body: Body
-    source: dict[str, object]
-    fit: Fit | None
+    Attributes:
+        w_out: its readout; None if it blew up under the teacher.
+        recoveries: by perturbation; those of the first body with their outputs.
+        noise_errors: (amplitudes,) its tolerance curve.
+    """
+
+    w_out: Array | None
     unperturbed_error: float
     recoveries: dict[str, Recovery]
     noise_errors: Array
@@ -52,27 +59,28 @@ class BodyResult:
 
 @dataclass(frozen=True)
 class Result:
-    """All bodies; the first is drawn."""
+    """The first body; the results of all, each a dictionary by task; the first is drawn."""
 
     config: Config
-    target: Target
-    bodies: list[BodyResult]
-
-    @property
-    def body(self) -> Body:
-        """The first body."""
-        return self.bodies[0].body
+    body: Body
+    bodies: list[dict[str, TaskResult]]
 
     @property
     def readouts(self) -> dict[str, Array]:
-        """The first body's readout by task; empty if it blew up under the teacher."""
-        fit = self.bodies[0].fit
-        return {} if fit is None else {self.target.name: fit.w_out}
+        """The first body's readouts by task, of those that were taught."""
+        tasks = self.bodies[0].items()
+        return {name: task.w_out for name, task in tasks if task.w_out is not None}
 
     @property
     def metrics(self) -> dict[str, object]:
-        """As written to metrics.json: the first body's numbers, and counts over all seeds."""
-        first, config = self.bodies[0], self.config
+        """As written to metrics.json: those of the task, or of each by its name."""
+        tables = {name: self._metrics_of(name) for name in self.bodies[0]}
+        return next(iter(tables.values())) if len(tables) == 1 else dict(tables)
+
+    def _metrics_of(self, task: str) -> dict[str, object]:
+        """The first body's numbers, and counts over all seeds."""
+        of_all, config = [body[task] for body in self.bodies], self.config
+        first = of_all[0]
         table: dict[str, object] = {
             name: {"orbit_error": r.orbit_error, "recovery_time": r.recovery_time}
             for name, r in first.recoveries.items()
@@ -81,18 +89,18 @@ class Result:
         table["noise_curve"] = {
             "amplitudes": config.noise_curve,
             "orbit_errors": first.noise_errors,
-            "recovered": [self._count([b.noise_errors[k] for b in self.bodies])
+            "recovered": [self._count([one.noise_errors[k] for one in of_all])
                           for k in range(len(config.noise_curve))],
         }  # fmt: skip
         if config.seeds > 1:
-            rows = {name: self.over_seeds(name) for name in first.recoveries}
-            errors = [body.unperturbed_error for body in self.bodies]
+            rows = {name: self.over_seeds(task, name) for name in first.recoveries}
+            errors = [one.unperturbed_error for one in of_all]
             table["seeds"] = rows | {"unperturbed": self._count(errors)}
         return table
 
-    def over_seeds(self, name: str) -> dict[str, object]:
+    def over_seeds(self, task: str, name: str) -> dict[str, object]:
         """How many bodies recover from a perturbation, and how fast: the median of all."""
-        of_all = [body.recoveries[name] for body in self.bodies]
+        of_all = [body[task].recoveries[name] for body in self.bodies]
         errors, times = [r.orbit_error for r in of_all], [r.recovery_time for r in of_all]
         return {
             **self._count(errors),

@@ -7,15 +7,17 @@ import numpy as np
 from mcmj.core.body import Body
 from mcmj.experiments.blow_ups import or_lost
 from mcmj.experiments.perturb.config import Config
-from mcmj.experiments.perturb.result import LOST, BodyResult, Recovery, Result
-from mcmj.learning.teaching import teach
+from mcmj.experiments.perturb.result import LOST, Recovery, Result, TaskResult
+from mcmj.learning.recipe import train
 from mcmj.metrics import orbits
 from mcmj.simulation.phases import Phase, Schedule
 from mcmj.simulation.run_phases import run_schedule
 from mcmj.simulation.simulation import Simulation
 from mcmj.targets.limit_cycles import Target
-from mcmj.targets.named import named_target, require_outputs
+from mcmj.targets.named import require_outputs
 from mcmj.utils.progress import OnSteps
+from mcmj.utils.threads import in_threads
+from mcmj.utils.validation import Array
 
 # what a search over many bodies leaves out, see mcmj.search.experiment
 SEARCH_DEFAULTS = {"noise_curve": ()}
@@ -27,38 +29,58 @@ def run(config: Config, *, on_steps: OnSteps = lambda steps: None) -> Result:
     Raises:
         InvalidArgumentError: a body without as many outputs as the task has.
     """
-    wanted = named_target(config.task)
-    seeds = config.source.all_seeds
-    return Result(config, wanted, [_of_body(config, seed, wanted, on_steps) for seed in seeds])
+    seeds, targets = config.source.all_seeds, config.targets
+    first, _ = get_body(config, seeds[0])
+    for wanted in targets.values():
+        require_outputs(first, wanted)
+    pairs = [(seed, name) for seed in seeds for name in targets]
+
+    def work(pair: tuple[int, str], report: OnSteps) -> TaskResult:
+        seed, name = pair
+        return _of_task(config, seed, targets[name], seed == seeds[0], report)
+
+    runs = iter(in_threads(work, pairs, on_steps))
+    return Result(config, first, [dict(zip(targets, runs, strict=False)) for _ in seeds])
 
 
-def get_body(config: Config, seed: int) -> tuple[Body, dict[str, object], dict[str, Any]]:
-    """The body of a seed, or the config's; where it comes from; arguments of its Simulation."""
+def get_body(config: Config, seed: int) -> tuple[Body, dict[str, Any]]:
+    """The body of a seed, or the config's, and the arguments of its Simulation."""
     stored = config.source.get(seed)
     names = ("springs",) if config.engine != "twin" else ()
-    stepping = stored.take(*names, timestep=config.timestep, engine=config.engine)
-    return stored.body, stored.provenance, stepping
+    return stored.body, stored.take(*names, timestep=config.timestep, engine=config.engine)
 
 
-def _of_body(config: Config, seed: int, wanted: Target, on_steps: OnSteps) -> BodyResult:
-    body, source, settings = get_body(config, seed)
-    require_outputs(body, wanted)
-    simulation = Simulation(body, **settings)
+def _of_task(
+    config: Config, seed: int, wanted: Target, whole: bool, on_steps: OnSteps
+) -> TaskResult:
+    """One task of one body.
+
+    Args:
+        whole: keep the outputs.
+    """
+    body, stepping = get_body(config, seed)
+    simulation = Simulation(body, **stepping)
     curve = [Phase(config.window, length_noise=std) for std in config.noise_curve]
-    fit = or_lost(lambda: teach(simulation, wanted, config.teaching, seed, on_steps=on_steps), None)
-    if fit is None:
+
+    def taught() -> Array:
+        return train(
+            simulation, wanted, seed, teaching=config.teaching, practice=config.practice,
+            on_steps=on_steps,
+        ).fit.w_out  # fmt: skip
+
+    w_out = or_lost(taught, None)
+    if w_out is None:
         lost = dict.fromkeys(config.perturbations, LOST)
-        return BodyResult(body, source, None, np.inf, lost, np.full(len(curve), np.inf))
+        return TaskResult(None, np.inf, lost, np.full(len(curve), np.inf))
     start = simulation.snapshot()
 
     def after(phase: Phase) -> Recovery:
         simulation.restore(start)
-        return disturb(config, simulation, phase, seed, wanted, on_steps)
+        found = disturb(config, simulation, phase, seed, wanted, on_steps)
+        return found if whole else found.judged
 
-    return BodyResult(
-        body=body,
-        source=source,
-        fit=fit,
+    return TaskResult(
+        w_out=w_out,
         unperturbed_error=after(Phase(config.window)).orbit_error,
         recoveries={name: after(phase) for name, phase in config.perturbations.items()},
         noise_errors=np.array([after(phase).orbit_error for phase in curve]),

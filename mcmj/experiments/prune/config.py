@@ -1,10 +1,11 @@
 """What the pruning experiment runs: its Config."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 from mcmj.core.random_body import BodySettings
 from mcmj.experiments.limit_cycle import config as limit_cycle
 from mcmj.learning.lessons import Teaching
+from mcmj.learning.recipe import BODIES, TEACHING
 from mcmj.learning.spring_selection import METHODS
 from mcmj.targets.named import named_target
 from mcmj.utils.errors import InvalidArgumentError
@@ -45,8 +46,8 @@ class Config:
     threshold: float = 0.05
     timestep: float = 1e-3
     engine: str = "mujoco"
-    settings: BodySettings = field(default_factory=BodySettings)
-    teaching: Teaching = field(default_factory=Teaching)
+    settings: BodySettings = BODIES
+    teaching: Teaching = TEACHING
 
     def __post_init__(self) -> None:
         named_target(self.task)

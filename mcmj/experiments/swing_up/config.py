@@ -1,14 +1,13 @@
 """What the swing-up experiment runs: its Config."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 from mcmj.core.random_body import BodySettings
 from mcmj.experiments.limit_cycle import config as limit_cycle
 from mcmj.learning.lessons import Teaching
 from mcmj.learning.practice import Practice
+from mcmj.learning.recipe import BODIES, PRACTICE, TEACHING
 from mcmj.utils.validation import require_count, require_number
-
-TAUGHT = Teaching(duration=240.0, rest_runs=2, rest_duration=30.0, rest_weight=1e-2)
 
 
 @dataclass(frozen=True)
@@ -48,9 +47,9 @@ class Config:
     engine: str = "mujoco"
     kicks: int = 8
     kick_speed: float = 0.02
-    settings: BodySettings = field(default_factory=BodySettings)
-    teaching: Teaching = field(default_factory=lambda: TAUGHT)
-    practice: Practice = field(default_factory=Practice)
+    settings: BodySettings = BODIES
+    teaching: Teaching = TEACHING
+    practice: Practice = PRACTICE
 
     def __post_init__(self) -> None:
         require_count("kicks", self.kicks, 0)

@@ -16,7 +16,8 @@ class SwingUp:
     """One task of one body.
 
     Attributes:
-        outputs: (T, n_outputs) from rest, one every timestep; empty if it blew up.
+        outputs: (T, n_outputs) from rest, one every timestep; empty if it blew up, and of
+            all bodies but the first, for they would fill the memory.
         orbit_error: of the last part; infinite if it blew up.
         swing_up_time: until the outputs stay within the tolerance of the orbit [s], infinite
             if they do not.

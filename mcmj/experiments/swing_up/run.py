@@ -1,5 +1,7 @@
 """Fig. 7: from total rest the closed loop swings up onto the taught orbit."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from mcmj.experiments.blow_ups import or_lost
@@ -7,8 +9,7 @@ from mcmj.experiments.limit_cycle import config as limit_cycle
 from mcmj.experiments.swing_up.config import Config
 from mcmj.experiments.swing_up.result import Result, SwingUp
 from mcmj.learning.free_run import free_run
-from mcmj.learning.practice import practise
-from mcmj.learning.teaching import Course, lessons_of
+from mcmj.learning.recipe import train
 from mcmj.metrics import orbits
 from mcmj.simulation.simulation import Simulation
 from mcmj.targets.limit_cycles import Target
@@ -41,7 +42,8 @@ def run(config: Config, *, on_steps: OnSteps = lambda steps: None) -> Result:
         one, name = pair
         body, _, _, stepping = first_found if one == first else limit_cycle.get_body(one)
         simulation = Simulation(body, **stepping)
-        return _swing_up(config, simulation, targets[name], one.noise_seed, report)
+        found = _swing_up(config, simulation, targets[name], one.noise_seed, report)
+        return found if one == first else replace(found, outputs=found.outputs[:0])
 
     runs = iter(in_threads(work, pairs, on_steps))
     return Result(
@@ -54,12 +56,13 @@ def _swing_up(
 ) -> SwingUp:
     """Readouts in body files are not used: they were taught to run, not to swing up."""
     body = simulation.body
-    course = Course(simulation, config.teaching, seed)
     try:
-        course.attend_all(lessons_of(wanted, config.teaching), on_steps=on_steps)
+        practised = train(
+            simulation, wanted, seed, teaching=config.teaching, practice=config.practice,
+            on_steps=on_steps,
+        )  # fmt: skip
     except DivergenceError:
         return SwingUp(wanted, None, np.zeros((0, body.n_outputs)), np.inf, np.inf, (), None)
-    practised = practise(course, wanted, config.practice, on_steps=on_steps)
     outputs = _free_run(config, simulation, None, on_steps)
     speeds = stream(seed, "initial_state")
     kicked = [

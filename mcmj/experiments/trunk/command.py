@@ -6,11 +6,11 @@ from typing import Any
 from rich.console import Console
 
 from mcmj.experiments.base import Experiment, counting, table_of
-from mcmj.experiments.trunk.config import Config, total_seconds
+from mcmj.experiments.trunk.config import Config, total_steps
 from mcmj.experiments.trunk.figure import figures
 from mcmj.experiments.trunk.result import Result
 from mcmj.experiments.trunk.run import run
-from mcmj.robots.trunk_walker import TIMESTEP, walk
+from mcmj.robots.trunk_walker import walk
 from mcmj.utils import files
 
 SHOWN = 5.0  # seconds of each gait in the film
@@ -70,7 +70,7 @@ EXPERIMENT = Experiment(
     config=Config,
     run=run,
     show=show,
-    bar=counting("walking", lambda config: round(total_seconds(config) / TIMESTEP)),
+    bar=counting("walking", total_steps),
     write=write,
     figures=figures,
     film=film,

@@ -1,10 +1,12 @@
 """What the experiment of the walking trunk runs: its Config."""
 
 from dataclasses import dataclass, field
+from typing import ClassVar
 
 from mcmj.learning.force_learning import ForceLearning
 from mcmj.robots.recorded_walk import PUSH_DURATION
 from mcmj.robots.trunk import TrunkSettings
+from mcmj.robots.trunk_walker import STEPS
 from mcmj.targets.gaits import GAITS
 from mcmj.utils.errors import InvalidArgumentError
 from mcmj.utils.validation import (
@@ -41,6 +43,8 @@ class Config:
         learning: how they learn.
     """
 
+    known_parts: ClassVar[tuple[str, ...]] = PARTS
+
     gaits: tuple[str, ...] = tuple(GAITS)
     seed: int = 0
     seeds: int = 1
@@ -59,7 +63,7 @@ class Config:
     def __post_init__(self) -> None:
         require_names("gait", self.gaits, GAITS)
         if self.parts:
-            require_names("part", self.parts, PARTS)
+            require_names("part", self.parts, self.known_parts)
         require_seed("seed", self.seed)
         for name in ("seeds", "pushes"):
             require_count(name, getattr(self, name), 1)
@@ -77,8 +81,12 @@ class Config:
                 require_number(name, value, 0.0, open_low=True)
 
 
-def total_seconds(config: Config) -> float:
-    """Time simulated at most, for a progress bar [s]."""
+def total_steps(config: Config) -> int:
+    """Steps at most, for a progress bar."""
+    return round(_seconds(config) / STEPS[3 if config.trunk.depth else 2][1])
+
+
+def _seconds(config: Config) -> float:
     learning, gaits = config.learning, len(config.gaits)
     parts = {
         "regression": learning.washout + config.teaching + config.walking,

@@ -1,10 +1,13 @@
 """A walking trunk: the robot, its muscles' commands, its feet on the ground."""
 
+from collections.abc import Callable
+
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
+from matplotlib.gridspec import SubplotSpec
 
-from mcmj.experiments.trunk.result import Result
+from mcmj.experiments.trunk.result import LearnedGait, Result
 from mcmj.pictures.footfalls import draw_stance
 from mcmj.pictures.plotting import OUTPUT_STYLES, TARGET_STYLE, best_phase, new_figure
 from mcmj.robots.trunk import Trunk
@@ -24,16 +27,25 @@ def figures(result: Result) -> dict[str, Figure]:
 
 def trunk_figure(result: Result) -> Figure:
     """The robot as drawn; below, gait by gait, commands of a fore leg on their target, and feet."""
-    trunk = next(iter(result.gaits.values())).trunk
+
+    def draw(figure: Figure, place: SubplotSpec) -> Axes:
+        axes = figure.add_subplot(place)
+        draw_trunk_body(axes, next(iter(result.gaits.values())).trunk)
+        return axes
+
+    return draw_gaits(result.gaits, draw)
+
+
+def draw_gaits(
+    gaits: dict[str, LearnedGait], draw_robot: Callable[[Figure, SubplotSpec], Axes]
+) -> Figure:
+    """Commands and feet of the gaits that were learned, below what `draw_robot` draws."""
     walks = {
-        name: (gait.target, gait.walk)
-        for name, gait in result.gaits.items()
-        if gait.walk is not None
+        name: (gait.target, gait.walk) for name, gait in gaits.items() if gait.walk is not None
     }
     figure = new_figure(3.1 * max(2, len(walks)), 7.4)
     grid = figure.add_gridspec(3, len(walks), height_ratios=(1.5, 1.2, 0.8))
-    robot = figure.add_subplot(grid[0, :])
-    draw_trunk_body(robot, trunk)
+    robot = draw_robot(figure, grid[0, :])
     lines = dict(zip(*reversed(robot.get_legend_handles_labels()), strict=True))
     for column, (name, (target, walk)) in enumerate(walks.items()):
         last = walk.after(walk.times[-1] - PERIODS * target.period)

@@ -9,9 +9,9 @@ from mcmj.experiments.blow_ups import or_lost
 from mcmj.experiments.trunk.config import Config
 from mcmj.experiments.trunk.result import LearnedGait, Table, fell, forward_speed
 from mcmj.learning.force_learning import force_learn
-from mcmj.learning.trial import trial_error
+from mcmj.learning.free_run import trial_error
 from mcmj.metrics import orbits as metrics
-from mcmj.robots.trunk_walker import TIMESTEP, has_fallen, new_robot, stand, walk
+from mcmj.robots.trunk_walker import has_fallen, new_robot, stand, walk
 from mcmj.simulation.reservoir import Reservoir
 from mcmj.utils.errors import DivergenceError
 from mcmj.utils.progress import OnSteps
@@ -40,13 +40,17 @@ def from_rest(config: Config, gaits: dict[str, LearnedGait], name: str, on_steps
     """The loop is closed while the robot stands: does it start by itself?"""
     robot = gaits[name].robot()
     stand(robot)
-    table = _end_of(config, gaits[name], robot, config.walking)
+    table = end_of(config, gaits[name], robot, config.walking)
     on_steps(round(config.walking / robot.timestep))
     return table
 
 
 def push(
-    config: Config, gaits: dict[str, LearnedGait], name: str, on_steps: OnSteps
+    config: Config,
+    gaits: dict[str, LearnedGait],
+    name: str,
+    on_steps: OnSteps,
+    axis: int = 0,
 ) -> dict[float, int]:
     """How many pushes of each size, both ways at every moment, do not end in a fall."""
     gait = gaits[name]
@@ -61,7 +65,7 @@ def push(
         for moment in moments:
             for way in (impulse, -impulse):
                 robot.restore(moment)
-                ends.append(_end_of(config, gait, robot, config.survive, push=way))
+                ends.append(end_of(config, gait, robot, config.survive, push=way, axis=axis))
         survived[impulse] = sum(end["falls"] == 0 for end in ends)
         on_steps(round(len(ends) * config.survive / robot.timestep))
     return survived
@@ -76,7 +80,7 @@ def switch(config: Config, gaits: dict[str, LearnedGait], name: str, on_steps: O
             learned = gaits[other].learned
             assert learned is not None
             robot.set_readout(learned.w_out)
-            table[other] = _end_of(config, gaits[other], robot, config.survive)
+            table[other] = end_of(config, gaits[other], robot, config.survive)
             on_steps(round(config.survive / robot.timestep))
     return table
 
@@ -88,8 +92,8 @@ def step_study(
     table: Table = {}
     for step in config.steps_ms:
         robot = gaits[name].robot(1e-3 * step)
-        table[f"{step:g}"] = _end_of(config, gaits[name], robot, config.walking)
-        on_steps(round(config.walking / TIMESTEP))
+        table[f"{step:g}"] = end_of(config, gaits[name], robot, config.walking)
+        on_steps(round(config.walking / robot.timestep))
     return table
 
 
@@ -102,11 +106,17 @@ def push_summary(config: Config, survived: dict[str, dict[float, int]]) -> Table
     return {"survived": counts, "of": 2 * config.pushes}
 
 
-def _end_of(
-    config: Config, gait: LearnedGait, robot: Reservoir, duration: float, *, push: float = 0.0
+def end_of(
+    config: Config,
+    gait: LearnedGait,
+    robot: Reservoir,
+    duration: float,
+    *,
+    push: float = 0.0,
+    axis: int = 0,
 ) -> Table:
     """How a walk from now on ends: its last part, half of it at most."""
-    walked = or_lost(lambda: walk(robot, gait.trunk, duration, push=push), None)
+    walked = or_lost(lambda: walk(robot, gait.trunk, duration, push=push, axis=axis), None)
     if walked is None or fell(gait, walked):
         return {"falls": 1, "speed_m_s": None, "orbit_error": None}
     last = walked.after(duration - min(config.judged, duration / 2))

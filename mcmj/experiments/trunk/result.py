@@ -12,7 +12,7 @@ from mcmj.metrics.success_rates import success_rate
 from mcmj.robots import walk_metrics
 from mcmj.robots.quadruped import GRAVITY
 from mcmj.robots.trunk import Trunk
-from mcmj.robots.trunk_walker import TIMESTEP, new_robot
+from mcmj.robots.trunk_walker import new_robot
 from mcmj.robots.walk_metrics import Walk
 from mcmj.simulation.reservoir import Reservoir
 from mcmj.targets.limit_cycles import Target
@@ -36,13 +36,13 @@ class LearnedGait:
     learned: Learned | None
     walk: Walk | None
 
-    def robot(self, timestep: float = TIMESTEP) -> Reservoir:
-        """The robot in this gait, at any time step [s]."""
+    def robot(self, timestep: float | None = None) -> Reservoir:
+        """The robot in this gait, at its own or any other time step [s]."""
         assert self.learned is not None
         robot = new_robot(self.trunk)
         robot.set_readout(self.learned.w_out)
         robot.restore(self.learned.state)
-        if timestep == robot.timestep:
+        if timestep in (None, robot.timestep):
             return robot
         other = new_robot(self.trunk, timestep=timestep)
         other.set_readout(self.learned.w_out)
