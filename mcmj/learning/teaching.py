@@ -4,7 +4,6 @@ from collections.abc import Iterable
 from copy import copy
 
 import numpy as np
-from scipy.stats.qmc import Halton
 
 from mcmj.learning.lessons import HELD, HELD_SIZE, Lesson, TeacherNoise, Teaching
 from mcmj.learning.regression import Fit, Regression
@@ -83,6 +82,8 @@ def lessons_of(target: Target, teaching: Teaching) -> list[Lesson]:
 def held_outputs(target: Target, count: int) -> Array:
     """Constants (count, n_outputs), evenly over the box of HELD_SIZE times the largest outputs."""
     largest = np.abs(target.orbit(ORBIT_POINTS)).max(axis=0)
+    from scipy.stats.qmc import Halton  # takes a second to import
+
     places = Halton(target.n_outputs, scramble=False).random(count + 1)[1:]  # the first is a corner
     found: Array = HELD_SIZE * largest * (2.0 * places - 1.0)
     return found
