@@ -209,7 +209,7 @@ def test_the_quadratic_body_recovers_from_all_of_fig_6():
 @pytest.mark.slow
 def test_the_general_body_swings_up_on_all_tasks():
     result = swing_up.run(swing_up.Config(engine="twin"))
-    assert result.metrics["orbit_error"] < 0.01
+    assert result.metrics["orbit_error"] < 0.02
     assert result.metrics["swing_up_time"] < 30
 
 
