@@ -45,7 +45,7 @@ wanted_stamp() { echo "$ver $root $(cksum <"$root/pyproject.toml")"; }
 # The extra that a command needs, if any: an experiment says so in its folder.
 extra_of() {
     case $1 in
-        test | pytest | ruff | mypy) echo dev ;;
+        test | pytest | ruff | mypy | sphinx-build) echo dev ;;
         *) sed -n 's/^EXTRA = "\([a-z]*\)".*/\1/p' "$root/mcmj/experiments/$1/__init__.py" ;;
     esac 2>/dev/null || :
 }

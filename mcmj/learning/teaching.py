@@ -81,9 +81,9 @@ def lessons_of(target: Target, teaching: Teaching) -> list[Lesson]:
 
 def held_outputs(target: Target, count: int) -> Array:
     """Constants (count, n_outputs), evenly over the box of HELD_SIZE times the largest outputs."""
-    largest = np.abs(target.orbit(ORBIT_POINTS)).max(axis=0)
     from scipy.stats.qmc import Halton  # takes a second to import
 
+    largest = np.abs(target.orbit(ORBIT_POINTS)).max(axis=0)
     places = Halton(target.n_outputs, scramble=False).random(count + 1)[1:]  # the first is a corner
     found: Array = HELD_SIZE * largest * (2.0 * places - 1.0)
     return found

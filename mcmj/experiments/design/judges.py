@@ -1,4 +1,4 @@
-"""How a body is scored: by the whole recipe of a task, taught, then run from off the cycle."""
+"""How a body is scored: taught by teacher forcing, then run from off the cycle."""
 
 from dataclasses import dataclass, field, replace
 from typing import Protocol
@@ -11,7 +11,7 @@ from mcmj.experiments.blow_ups import or_lost
 from mcmj.experiments.input_driven import config as input_driven
 from mcmj.experiments.input_driven.lessons import course_lesson
 from mcmj.experiments.input_driven.run import try_out
-from mcmj.learning.lessons import Lesson, Teaching
+from mcmj.learning.lessons import Teaching
 from mcmj.learning.teaching import teach
 from mcmj.metrics.orbits import orbit_error
 from mcmj.reference.integration import integrate_smooth
@@ -189,11 +189,8 @@ class InputDriven:
 
     def _try(self, body: Body, seed: int, config: input_driven.Config) -> Tried:
         simulation = Simulation(body, timestep=config.timestep, engine=config.engine)
-        outcome = try_out(config, simulation, self._lesson(config), seed)
+        outcome = try_out(config, simulation, course_lesson(config), seed)
         return Tried(tuple(outcome.orbit_errors.values()), simulation.w_out)
-
-    def _lesson(self, config: input_driven.Config) -> Lesson:
-        return course_lesson(config)
 
 
 def judge_of(task: str, teaching: Teaching, free_run: float) -> Judge:
