@@ -24,7 +24,7 @@ def write(result: Result, out: Path) -> None:
     """body.xml with all readouts, and the free runs."""
     config, tasks = result.config, result.tasks
     write_body(result, result.source, out)
-    arrays = {"timestep": np.array(config.timestep)}
+    arrays = {"timestep": np.array(result.stepping["timestep"])}
     for name, task in tasks.items():
         arrays[f"{name}/start_time"], arrays[f"{name}/outputs"] = task.times[0], task.outputs
     files.write_arrays(out / "trajectory.npz", arrays, config, config.noise_seed)

@@ -42,7 +42,8 @@ class Config:
         threshold: largest orbit error of a success.
         free_run: length of the free run in closed loop [s].
         window: the errors are those of this last part of it [s].
-        timestep: control and physics step [s].
+        timestep: control and physics step [s]; of a body that blows up with it, a half, then a
+            quarter.
         integrator: as for Simulation; default: the body file's, or Simulation's.
         engine: mujoco, or twin: faster, the same to rounding, no video.
         windows: length [s] of the consecutive windows of the free run whose errors are given

@@ -38,7 +38,8 @@ class Result:
     """All tasks of one body, and what the closed loop costs, if that was measured.
 
     Attributes:
-        stepping: arguments of the Simulation.
+        stepping: arguments of the Simulation; its time step is a half or a quarter of the
+            config's if the body blew up with that.
         tasks: without those on which one of several bodies blew up.
         seeds: how all bodies did, if there are several.
     """
@@ -74,6 +75,7 @@ class Result:
             for name, row in self.seeds.metrics.items():
                 table[name] = {**table.get(name, {}), **row}
             table["best_seed"] = self.seeds.best_seed
+        table["timestep"] = self.stepping["timestep"]
         table["steps_per_second"] = self.steps_per_second
         table["closed_loop_cost_ratio"] = self.closed_loop_cost_ratio
         return table

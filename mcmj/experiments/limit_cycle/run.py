@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from mcmj.core.integrators import DEFAULT_INTEGRATOR
+from mcmj.experiments.blow_ups import finer
 from mcmj.experiments.limit_cycle.config import Config, Found, check_task, get_body
 from mcmj.experiments.limit_cycle.loop_cost import closed_loop_cost
 from mcmj.experiments.limit_cycle.result import Result, TaskResult
@@ -66,10 +67,8 @@ def run(
         CheckpointError: a checkpoint is damaged.
         OutputError: another run is at work in the folder, or it cannot be written.
     """
-    found = body, _, source, stepping = get_body(config)
-    kept = {} if folder is None else checkpoints(config, folder, found)
     with nullcontext() if folder is None else only_run(folder):
-        outcomes = run_tasks(config, found, kept, on_steps=on_steps)
+        (body, _, source, stepping), kept, outcomes = _of_body(config, folder, on_steps)
     tasks = {}
     for name, outcome in outcomes.items():
         if not isinstance(outcome, DivergenceError):
@@ -84,12 +83,25 @@ def run(
     return Result(config, body, source, stepping, tasks, kept, speed, ratio, seeds)
 
 
+def _of_body(
+    config: Config, folder: Path | None, on_steps: OnSteps
+) -> tuple[Found, dict[str, Checkpoint], Outcomes]:
+    """All tasks of one body; where it blows up, from anew with finer time steps."""
+    for one in finer(config):
+        found = get_body(one)
+        kept = {} if folder is None else checkpoints(one, folder, found)
+        outcomes = run_tasks(one, found, kept, on_steps=on_steps)
+        if not any(isinstance(outcome, DivergenceError) for outcome in outcomes.values()):
+            break
+    return found, kept, outcomes
+
+
 def _over_seeds(config: Config, first: Outcomes, on_steps: OnSteps) -> SuccessOfSeeds:
     """The outcomes of all bodies; one that blows up is a failure."""
     found = [_error_pairs(first)]
     for seed in range(config.noise_seed + 1, config.noise_seed + config.seeds):
-        one = replace(config, seed=seed, seeds=1)
-        found.append(_error_pairs(run_tasks(one, get_body(one), on_steps=on_steps)))
+        _, _, outcomes = _of_body(replace(config, seed=seed, seeds=1), None, on_steps)
+        found.append(_error_pairs(outcomes))
     errors = {name: np.array([pairs[name] for pairs in found]) for name in config.targets}
     return SuccessOfSeeds(
         config.noise_seed,

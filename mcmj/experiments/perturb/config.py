@@ -36,7 +36,8 @@ class Config:
         noise_curve: amplitudes of the curve of noise tolerance [m].
         tolerance: of the target orbit, over its RMS radius, for recovery and for success.
         error_window: the orbit error is that of this last part [s].
-        timestep: control and physics step [s].
+        timestep: control and physics step [s]; of a body that blows up with it, a half, then a
+            quarter.
         engine: mujoco, or twin: faster, the same to rounding.
         settings: what a random body is drawn from.
         teaching: how the readout is taught.

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 from mcmj.core.body import Body
-from mcmj.experiments.blow_ups import or_lost
+from mcmj.experiments.blow_ups import or_lost, with_finer_steps
 from mcmj.experiments.perturb.config import Config
 from mcmj.experiments.perturb.result import LOST, Recovery, Result, TaskResult
 from mcmj.learning.recipe import train
@@ -17,7 +17,6 @@ from mcmj.targets.limit_cycles import Target
 from mcmj.targets.named import require_outputs
 from mcmj.utils.progress import OnSteps
 from mcmj.utils.threads import in_threads
-from mcmj.utils.validation import Array
 
 # what a search over many bodies leaves out, see mcmj.search.experiment
 SEARCH_DEFAULTS = {"noise_curve": ()}
@@ -37,7 +36,11 @@ def run(config: Config, *, on_steps: OnSteps = lambda steps: None) -> Result:
 
     def work(pair: tuple[int, str], report: OnSteps) -> TaskResult:
         seed, name = pair
-        return _of_task(config, seed, targets[name], seed == seeds[0], report)
+
+        def learned(one: Config) -> TaskResult:
+            return _of_task(one, seed, targets[name], seed == seeds[0], report)
+
+        return or_lost(lambda: with_finer_steps(learned, config), _lost(config))
 
     runs = iter(in_threads(work, pairs, on_steps))
     return Result(config, first, [dict(zip(targets, runs, strict=False)) for _ in seeds])
@@ -50,6 +53,12 @@ def get_body(config: Config, seed: int) -> tuple[Body, dict[str, Any]]:
     return stored.body, stored.take(*names, timestep=config.timestep, engine=config.engine)
 
 
+def _lost(config: Config) -> TaskResult:
+    """What a body that blew up under the teacher leaves."""
+    recoveries = dict.fromkeys(config.perturbations, LOST)
+    return TaskResult(None, np.inf, recoveries, np.full(len(config.noise_curve), np.inf))
+
+
 def _of_task(
     config: Config, seed: int, wanted: Target, whole: bool, on_steps: OnSteps
 ) -> TaskResult:
@@ -57,21 +66,17 @@ def _of_task(
 
     Args:
         whole: keep the outputs.
+
+    Raises:
+        DivergenceError: the body blew up under the teacher.
     """
     body, stepping = get_body(config, seed)
     simulation = Simulation(body, **stepping)
     curve = [Phase(config.window, length_noise=std) for std in config.noise_curve]
-
-    def taught() -> Array:
-        return train(
-            simulation, wanted, seed, teaching=config.teaching, practice=config.practice,
-            on_steps=on_steps,
-        ).fit.w_out  # fmt: skip
-
-    w_out = or_lost(taught, None)
-    if w_out is None:
-        lost = dict.fromkeys(config.perturbations, LOST)
-        return TaskResult(None, np.inf, lost, np.full(len(curve), np.inf))
+    w_out = train(
+        simulation, wanted, seed, teaching=config.teaching, practice=config.practice,
+        on_steps=on_steps,
+    ).fit.w_out  # fmt: skip
     start = simulation.snapshot()
 
     def after(phase: Phase) -> Recovery:

@@ -25,7 +25,8 @@ class Config:
         window: the orbit error is that of this last part of it [s].
         tolerance: of the target orbit, over its RMS radius, for the swing-up time and for
             success.
-        timestep: control and physics step [s].
+        timestep: control and physics step [s]; of a body that blows up with it, a half, then a
+            quarter.
         engine: mujoco, or twin: faster, the same to rounding.
         kicks: number of further starts, with the nodes kicked, that show how wide the way
             onto the orbit is; 0: none.

@@ -13,20 +13,16 @@ from mcmj.utils.colours import CHANGE_COLOUR
 
 def figures(result: Result) -> dict[str, Figure]:
     """By file name: Fig. 7 of the first body."""
-    return {"swing_up": swing_up_figure(result.bodies[0], result.config.timestep)}
+    return {"swing_up": swing_up_figure(result.bodies[0])}
 
 
-def swing_up_figure(tasks: Mapping[str, SwingUp], timestep: float) -> Figure:
-    """Fig. 7: from rest onto the orbit; outputs over time and the phase plane, a row a task.
-
-    Args:
-        timestep: of the outputs [s].
-    """
+def swing_up_figure(tasks: Mapping[str, SwingUp]) -> Figure:
+    """Fig. 7: from rest onto the orbit; outputs over time and the phase plane, a row a task."""
     figure = new_figure(12.0, 2.7 * len(tasks) + 0.5)
     axes = figure.subplots(len(tasks), 2, width_ratios=[3.0, 1.0], squeeze=False)
     for (name, task), (time_axes, plane) in zip(tasks.items(), axes, strict=True):
         outputs, swing_up = task.outputs, task.swing_up_time
-        times = timestep * np.arange(len(outputs))
+        times = task.timestep * np.arange(len(outputs))
         draw_orbit(plane, task.target)
         arrived = np.isfinite(swing_up)
         end = max(20.0, 1.5 * swing_up) if arrived else np.inf

@@ -16,6 +16,7 @@ class SwingUp:
     """One task of one body.
 
     Attributes:
+        timestep: of the simulation [s]; NaN if it blew up.
         outputs: (T, n_outputs) from rest, one every timestep; empty if it blew up, and of
             all bodies but the first, for they would fill the memory.
         orbit_error: of the last part; infinite if it blew up.
@@ -28,6 +29,7 @@ class SwingUp:
 
     target: Target
     w_out: Array | None
+    timestep: float
     outputs: Array
     orbit_error: float
     swing_up_time: float

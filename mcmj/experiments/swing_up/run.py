@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from mcmj.experiments.blow_ups import or_lost
+from mcmj.experiments.blow_ups import or_lost, with_finer_steps
 from mcmj.experiments.limit_cycle import config as limit_cycle
 from mcmj.experiments.swing_up.config import Config
 from mcmj.experiments.swing_up.result import Result, SwingUp
@@ -13,7 +13,6 @@ from mcmj.learning.recipe import train
 from mcmj.metrics import orbits
 from mcmj.simulation.simulation import Simulation
 from mcmj.targets.limit_cycles import Target
-from mcmj.utils.errors import DivergenceError
 from mcmj.utils.progress import OnSteps
 from mcmj.utils.seeds import stream
 from mcmj.utils.threads import in_threads
@@ -31,19 +30,19 @@ def run(config: Config, *, on_steps: OnSteps = lambda steps: None) -> Result:
         BodyFileError, InvalidArgumentError: a body that cannot do the task.
     """
     targets = config.of_seed(0).targets
-    pairs = [(config.of_seed(index), name) for index in range(config.seeds) for name in targets]
-    first = pairs[0][0]
-    first_found = limit_cycle.get_body(first)
-    first_body = first_found[0]
+    pairs = [(index, name) for index in range(config.seeds) for name in targets]
+    first_body = limit_cycle.get_body(config.of_seed(0))[0]
     for wanted in targets.values():
-        limit_cycle.check_task(first, first_body, wanted)
+        limit_cycle.check_task(config.of_seed(0), first_body, wanted)
 
-    def work(pair: tuple[limit_cycle.Config, str], report: OnSteps) -> SwingUp:
-        one, name = pair
-        body, _, _, stepping = first_found if one == first else limit_cycle.get_body(one)
-        simulation = Simulation(body, **stepping)
-        found = _swing_up(config, simulation, targets[name], one.noise_seed, report)
-        return found if one == first else replace(found, outputs=found.outputs[:0])
+    def work(pair: tuple[int, str], report: OnSteps) -> SwingUp:
+        index, name = pair
+
+        def learned(one: Config) -> SwingUp:
+            return _swing_up(one, index, targets[name], report)
+
+        found = or_lost(lambda: with_finer_steps(learned, config), _lost(targets[name]))
+        return found if index == 0 else replace(found, outputs=found.outputs[:0])
 
     runs = iter(in_threads(work, pairs, on_steps))
     return Result(
@@ -51,53 +50,56 @@ def run(config: Config, *, on_steps: OnSteps = lambda steps: None) -> Result:
     )
 
 
-def _swing_up(
-    config: Config, simulation: Simulation, wanted: Target, seed: int, on_steps: OnSteps
-) -> SwingUp:
-    """Readouts in body files are not used: they were taught to run, not to swing up."""
-    body = simulation.body
-    try:
-        practised = train(
-            simulation, wanted, seed, teaching=config.teaching, practice=config.practice,
-            on_steps=on_steps,
-        )  # fmt: skip
-    except DivergenceError:
-        return SwingUp(wanted, None, np.zeros((0, body.n_outputs)), np.inf, np.inf, (), None)
+def _lost(wanted: Target) -> SwingUp:
+    """What a body that blew up leaves."""
+    return SwingUp(wanted, None, np.nan, np.zeros((0, wanted.n_outputs)), np.inf, np.inf, (), None)
+
+
+def _swing_up(config: Config, index: int, wanted: Target, on_steps: OnSteps) -> SwingUp:
+    """One body. Readouts in body files are not used: they were taught to run, not to swing up.
+
+    Raises:
+        DivergenceError: it blew up under the teacher or from rest.
+    """
+    of_body = config.of_seed(index)
+    body, _, _, stepping = limit_cycle.get_body(of_body)
+    simulation, seed = Simulation(body, **stepping), of_body.noise_seed
+    practised = train(
+        simulation, wanted, seed, teaching=config.teaching, practice=config.practice,
+        on_steps=on_steps,
+    )  # fmt: skip
     outputs = _free_run(config, simulation, None, on_steps)
     speeds = stream(seed, "initial_state")
-    kicked = [
-        _free_run(
-            config, simulation,
-            config.kick_speed * speeds.standard_normal(body.positions.shape), on_steps,
-        )
-        for _ in range(config.kicks)
-    ]  # fmt: skip
-    errors = [_end_error(config, run, wanted) for run in kicked]
+
+    def kicked_error() -> float:
+        velocities = config.kick_speed * speeds.standard_normal(body.positions.shape)
+        return _end_error(config, _free_run(config, simulation, velocities, on_steps), wanted)
+
+    errors = [or_lost(kicked_error, np.inf) for _ in range(config.kicks)]
     return SwingUp(
         target=wanted,
         w_out=practised.fit.w_out,
+        timestep=simulation.timestep,
         outputs=outputs,
         orbit_error=_end_error(config, outputs, wanted),
-        swing_up_time=np.inf if not len(outputs) else orbits.recovery_time(
+        swing_up_time=orbits.recovery_time(
             outputs, config.timestep, wanted, tolerance=config.tolerance
         ),
         practice_errors=practised.errors,
-        kicked_fraction=float(np.mean(np.array(errors) < config.tolerance)) if kicked else None,
-    )  # fmt: skip
+        kicked_fraction=float(np.mean(np.array(errors) < config.tolerance)) if errors else None,
+    )
 
 
 def _free_run(
     config: Config, simulation: Simulation, velocities: Array | None, on_steps: OnSteps
 ) -> Array:
-    """Outputs (T, n_outputs) of a free run from the body's rest positions; empty if it blows up."""
+    """Outputs (T, n_outputs) of a free run from the body's rest positions."""
     steps = round(config.free_run / config.timestep)
     simulation.reset()
     if velocities is not None:
         simulation.set_state(velocities=velocities)
-    nothing = np.zeros((0, simulation.body.n_outputs))
-    return or_lost(lambda: free_run(simulation, steps, on_steps=on_steps), nothing)
+    return free_run(simulation, steps, on_steps=on_steps)
 
 
 def _end_error(config: Config, outputs: Array, wanted: Target) -> float:
-    last = outputs[-round(config.window / config.timestep) :]
-    return orbits.orbit_error(last, wanted) if len(last) else np.inf
+    return orbits.orbit_error(outputs[-round(config.window / config.timestep) :], wanted)
