@@ -80,7 +80,7 @@ def duty_factor_error(duties: Array, target: Target) -> float:
 def switching_time(
     outputs: Array, timestep: float, target: Target, *, tolerance: float = 0.05
 ) -> float:
-    """Time [s] from which on outputs (T, n) stay within the tolerance of the gait.
+    """Time [s] from which on outputs (T, n) stay within the tolerance of the gait, by the period.
 
     `metrics.recovery_time` in the space of (x(t), x(t + T* / 4)), T* the target's period: in
     the space of x(t) alone, legs in phase or antiphase draw a thin loop or a line, on which a

@@ -25,9 +25,14 @@ def distances_to_curve(points: Array, curve: Array, *, closed: bool) -> Array:
     return found
 
 
-def rows_within(points: Array, curve: Array, distance: float) -> int:
-    """How many of the last points (P, n) in a row are within a distance of a closed polygon."""
-    return int(_rows_within(np.ascontiguousarray(points), *_boxed(curve), distance))
+def rows_within(points: Array, curve: Array, distance: float, window: int = 1) -> int:
+    """How many of the last points (P, n) in a row are within a distance of a closed polygon.
+
+    Args:
+        distance: at most so much is the RMS one of as many points in a row as `window` says,
+            whichever of the counted ones they are.
+    """
+    return int(_rows_within(np.ascontiguousarray(points), *_boxed(curve), distance, window))
 
 
 def _boxed(curve: Array) -> tuple[Array, Array, Array]:
@@ -49,15 +54,18 @@ def _all_distances(points, curve, small, large, closed, found):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _rows_within(points, curve, small, large, distance):
-    at, count = 0, len(points)
+def _rows_within(points, curve, small, large, distance, window):
+    at, count, total = 0, len(points), 0.0
+    squares = np.empty(count)
     for k in range(count):
         point = points[count - 1 - k]
-        at = _walk(point, curve, at)
-        if not _to_sides(point, curve, at, True) <= distance:
-            at = _nearest(point, curve, small, large, at)
-            if not _to_sides(point, curve, at, True) <= distance:
-                return k
+        at = _nearest(point, curve, small, large, _walk(point, curve, at))
+        squares[k] = _to_sides(point, curve, at, True) ** 2
+        total += squares[k]
+        if k >= window:
+            total -= squares[k - window]
+        if k >= window - 1 and not total <= window * distance**2:
+            return k
     return count
 
 

@@ -50,15 +50,15 @@ def recovery_time(
 ) -> float:
     """Time [s] from which on the outputs (T, n_outputs) stay within the tolerance of the orbit.
 
-    Infinite unless they do so for a whole period at the end: the last output further from the
-    target orbit than tolerance x its RMS radius must come a period before the end.
+    From there on, the RMS distance from the target orbit over every period is at most tolerance x
+    the orbit's RMS radius; infinite unless it is over the last one.
     """
     require_number("tolerance", tolerance, 0.0, open_low=True)
     generated = as_array("outputs", outputs, (None, target.n_outputs))
     wanted = target.orbit(ORBIT_POINTS)
-    inside = rows_within(generated, wanted, tolerance * rms_radius(wanted))
-    time = (len(generated) - inside) * timestep
-    return time if time <= len(outputs) * timestep - target.period else np.inf
+    rows = round(target.period / timestep)
+    inside = rows_within(generated, wanted, tolerance * rms_radius(wanted), rows)
+    return (len(generated) - inside) * timestep if inside >= rows else np.inf
 
 
 def period(outputs: Array, timestep: float, guess: float) -> float:

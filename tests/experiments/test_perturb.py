@@ -37,23 +37,25 @@ def test_distances_are_to_the_orbit_over_its_radius():
     assert orbit_distances(goal.sample([0.1, 3.0]), goal).max() < 1e-5
 
 
-@pytest.mark.parametrize("last_outside", [None, 1.0, 2.5])
-def test_recovery_time_is_after_the_last_output_outside(last_outside):
+@pytest.mark.parametrize("rate", [0.2, 0.5, 1.0])
+def test_recovery_time_begins_the_periods_whose_rms_distance_is_small(rate):
+    """Of an orbit that is approached from outside, against the definition over all windows."""
     goal, step = target("quadratic"), 0.01
-    outputs = goal.sample(step * np.arange(2000))
-    expected = 0.0
-    if last_outside is not None:
-        outputs[10] += 5.0
-        outputs[round(last_outside / step)] *= 1.2
-        expected = last_outside + step
-    assert recovery_time(outputs, step, goal) == pytest.approx(expected)
+    times = step * np.arange(3000)
+    outputs = (1.0 + np.exp(-rate * times))[:, None] * goal.sample(times)
+    rows = round(goal.period / step)
+    windows = np.lib.stride_tricks.sliding_window_view(orbit_distances(outputs, goal), rows)
+    outside = np.flatnonzero(np.sqrt((windows**2).mean(axis=1)) > 0.05)
+    expected = step * (outside[-1] + 1)
+    assert 1.0 < expected < 20.0
+    assert recovery_time(outputs, step, goal) == pytest.approx(expected, abs=1e-9)
     assert recovery_time(outputs, step, goal, tolerance=100.0) == 0.0
 
 
 def test_recovery_needs_a_whole_period_inside():
     goal, step = target("quadratic"), 0.01
     outputs = goal.sample(step * np.arange(2000))
-    outputs[2000 - round(0.9 * goal.period / step)] += 5.0
+    outputs[2000 - round(0.9 * goal.period / step)] += 50.0
     assert recovery_time(outputs, step, goal) == np.inf
 
 
