@@ -23,7 +23,7 @@ from mcmj.utils.seeds import stream
 from mcmj.utils.validation import Array, require_names
 
 # at u = 1 [m]: feet fore and hind apart, all to the right, left and right up and down; all ahead
-TURN, BRAKE = (0.03, 0.015, 0.012), 0.1
+TURN, BRAKE = (0.03, 0.015, 0.012), 0.14
 LOWEST = {"turn": -1.0, "brake": 0.0}  # of u, by what it does; the largest is 1
 RAMP = 0.5  # s, from one value of u to the next, and in which a teacher begins
 TELL = 0.1  # s, between an operator's commands

@@ -41,8 +41,9 @@ def run(config: Config, *, on_steps: OnSteps = lambda steps: None) -> Result:
         def learned(one: Config) -> SwingUp:
             return _swing_up(one, index, targets[name], report)
 
-        found = or_lost(lambda: with_finer_steps(learned, config), _lost(targets[name]))
-        return found if index == 0 else replace(found, outputs=found.outputs[:0])
+        lost = _lost(targets[name])
+        found = or_lost(lambda: with_finer_steps(learned, config), lost)
+        return found if index == 0 else replace(found, outputs=lost.outputs)
 
     runs = iter(in_threads(work, pairs, on_steps))
     return Result(
