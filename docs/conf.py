@@ -44,8 +44,12 @@ DATA = Path(__file__).parent / "data"
 EXTRA = Path(__file__).parent.parent / "build" / "extra"  # files of the site that are made
 html_extra_path = [str(EXTRA)]
 BODY = """```{raw} html
-<iframe src="body.html" title="A soft body at work: pull a mass" loading="lazy"
- style="width: 100%; height: 52rem; border: 0"></iframe>
+<style>
+#soft-body { width: 100%; height: 56rem; border: 0 }
+@media (max-width: 49em) { #soft-body { height: calc(165vw + 42rem) } }  /* one column */
+</style>
+<iframe id="soft-body" src="body.html" title="A soft body at work: pull a mass" loading="lazy">
+</iframe>
 ```"""
 SECTION = re.compile(r"(Args|Attributes|Raises|Returns|Yields):$")
 

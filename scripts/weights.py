@@ -8,7 +8,6 @@ from pathlib import Path
 
 from packaging.requirements import Requirement
 
-EXTRAS = ("theory", "search", "cluster", "files", "control", "gym", "dev")
 SMALL = 5.0  # MB; lighter ones are one row
 
 
@@ -47,7 +46,7 @@ def main() -> None:
     print(f"| {len(small)} others | {sum(small):.0f} |")
     print(f"| **all {len(sizes)}** | **{sum(mb for mb, _ in sizes):.0f}** |\n")
     print("| extra | packages more | MB more | the heaviest |\n|---|---|---|---|")
-    for extra in EXTRAS:
+    for extra in distribution("mcmj").metadata.get_all("Provides-Extra") or ():
         more: dict[str, Distribution] = {}
         needed("mcmj", frozenset({extra}), more)
         new = sorted(((size(more[n]), n) for n in more.keys() - base.keys()), reverse=True)

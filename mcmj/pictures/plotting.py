@@ -127,7 +127,7 @@ def draw_orbit(axes: Axes, target: Target) -> None:
     # by its limits: a box as narrow as some orbits has no room for ticks
     axes.set_aspect("equal", adjustable="datalim")
     axes.margins(0.12)
-    axes.locator_params(nbins=5)
+    axes.locator_params(nbins=4)
 
 
 def count_in_whole_numbers(axes: Axes) -> None:

@@ -5,3 +5,4 @@ rhythm from total rest, whatever the noise. Killed at any moment, the same comma
 """
 
 GROUP = "search"
+EXTRA = "design"  # of pyproject.toml

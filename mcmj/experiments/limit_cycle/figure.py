@@ -31,7 +31,7 @@ def figures(result: Result) -> dict[str, Figure]:
 def limit_cycle_figure(result: Result) -> Figure:
     """Fig. 5: for each task the first and last part of its free run, its phase plane; the body."""
     tasks, free_run, window = result.tasks, result.config.free_run, result.config.window
-    figure = new_figure(15.5, 3.3 * len(tasks) + 0.9)
+    figure = new_figure(12.5, 2.8 * len(tasks) + 0.7)
     grid = figure.add_gridspec(len(tasks), 4, width_ratios=[1.6, 1.6, 1.0, 1.35])
     for row, task in enumerate(tasks.values()):
         target, times, outputs = task.target, task.times, task.outputs
