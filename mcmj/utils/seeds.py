@@ -35,6 +35,7 @@ PURPOSES = (
     "kicks",
     "body_design",
     "random_search",
+    "practice_push",
 )
 
 

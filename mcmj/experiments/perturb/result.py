@@ -56,6 +56,11 @@ class TaskResult:
     recoveries: dict[str, Recovery]
     noise_errors: Array
 
+    @property
+    def blew_up(self) -> bool:
+        """Under the teacher, or when it was disturbed."""
+        return self.w_out is None or any(np.isinf(r.orbit_error) for r in self.recoveries.values())
+
 
 @dataclass(frozen=True)
 class Result:

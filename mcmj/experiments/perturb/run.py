@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 from mcmj.core.body import Body
-from mcmj.experiments.blow_ups import or_lost, with_finer_steps
+from mcmj.experiments.blow_ups import finer, or_lost
 from mcmj.experiments.perturb.config import Config
 from mcmj.experiments.perturb.result import LOST, Recovery, Result, TaskResult
 from mcmj.learning.recipe import train
@@ -36,11 +36,14 @@ def run(config: Config, *, on_steps: OnSteps = lambda steps: None) -> Result:
 
     def work(pair: tuple[int, str], report: OnSteps) -> TaskResult:
         seed, name = pair
-
-        def learned(one: Config) -> TaskResult:
-            return _of_task(one, seed, targets[name], seed == seeds[0], report)
-
-        return or_lost(lambda: with_finer_steps(learned, config), _lost(config))
+        for one in finer(config):
+            found = or_lost(
+                lambda: _of_task(one, seed, targets[name], seed == seeds[0], report),  # noqa: B023
+                _lost(config),
+            )
+            if not found.blew_up:
+                break
+        return found
 
     runs = iter(in_threads(work, pairs, on_steps))
     return Result(config, first, [dict(zip(targets, runs, strict=False)) for _ in seeds])
