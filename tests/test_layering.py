@@ -63,6 +63,7 @@ MUJOCO = {
     "learning.environments.environment",
     "mjcf.body_model",
     "mjcf.check",
+    "mjcf.kept",
     "mjcf.read",
     "mjcf.without_tendons",
     "pictures.opengl",

@@ -8,14 +8,8 @@ from typing import Any
 from mcmj.core.body import Body
 from mcmj.core.callbacks.spring_laws import NATIVE, SPRING_LAWS
 from mcmj.core.integrators import DEFAULT_INTEGRATOR, TWINNED
-from mcmj.mjcf.read import (
-    body_of_model,
-    load_model,
-    provenance_of_model,
-    readout_of_model,
-    readouts_of_model,
-    settings_of_model,
-)
+from mcmj.mjcf.kept import provenance_of_model, readout_of_model, settings_of_model
+from mcmj.mjcf.read import body_of_model, load_model, readouts_of_model
 from mcmj.utils.errors import OtherPhysicsWarning, UnknownNameError
 from mcmj.utils.validation import Array
 

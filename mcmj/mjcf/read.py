@@ -1,17 +1,15 @@
 """MJCF -> Body: what `mcmj.mjcf.write` wrote, to the bit, from a file or a compiled model."""
 
-import json
 import re
 from pathlib import Path
-from typing import Any
 
 import mujoco
 import numpy as np
 
 from mcmj.core.body import Body
-from mcmj.core.callbacks.pointers import COUPLED_TAG, TAG
-from mcmj.core.integrators import INTEGRATORS
+from mcmj.core.callbacks.pointers import TAG
 from mcmj.mjcf.check import require_same_physics
+from mcmj.mjcf.kept import by_callback, ids, readout_of_model, stored_numbers, text_names, timing
 from mcmj.mjcf.scan import MAX_BYTES, read_body_file, scan
 from mcmj.mjcf.write import READOUT_PREFIX, to_mjcf
 from mcmj.utils.errors import BodyFileError, InvalidArgumentError
@@ -81,8 +79,8 @@ def body_of_model(model: mujoco.MjModel) -> Body:
     Raises:
         BodyFileError: the model is not an mcmj body, or holds physics that a Body cannot say.
     """
-    nodes = _ids(model, mujoco.mjtObj.mjOBJ_SITE, "n", model.nsite)
-    springs = _ids(model, mujoco.mjtObj.mjOBJ_TENDON, "s", model.ntendon)
+    nodes = ids(model, mujoco.mjtObj.mjOBJ_SITE, "n", model.nsite)
+    springs = ids(model, mujoco.mjtObj.mjOBJ_TENDON, "s", model.ntendon)
     if len(nodes) < 2 or len(springs) == 0:
         raise BodyFileError(
             "not an mcmj body: expected sites n0, n1, .. and spatial tendons s0, s1, .., got "
@@ -93,7 +91,7 @@ def body_of_model(model: mujoco.MjModel) -> Body:
     fixed = owner == 0
     positions = model.body_pos[owner] + model.site_pos[nodes]
     masses = np.where(fixed, 1.0, model.body_mass[owner])
-    if (stored := _stored(model, "fixed_masses")) is not None:
+    if (stored := stored_numbers(model, "fixed_masses")) is not None:
         masses[fixed] = _shaped(stored, (int(fixed.sum()),), "fixed_masses")
     try:
         body = Body(
@@ -103,7 +101,7 @@ def body_of_model(model: mujoco.MjModel) -> Body:
             masses=masses,
             w_in=_weights(model, "in", fixed),
             w_fb=_weights(model, "fb", fixed),
-            direction=_stored(model, "direction"),  # type: ignore[arg-type]  # None: x
+            direction=stored_numbers(model, "direction"),  # type: ignore[arg-type]  # None: x
             **_spring_parameters(model, springs),
         )
     except InvalidArgumentError as error:
@@ -115,14 +113,14 @@ def body_of_model(model: mujoco.MjModel) -> Body:
 
 def _written_again(model: mujoco.MjModel, body: Body) -> str:
     """The body as a file with the model's step, delays and kind of springs."""
-    step, delay, period = _timing(model)
+    step, delay, period = timing(model)
     closed = readout_of_model(model) is not None
     try:
         return to_mjcf(
             body,
             timestep=step,
             w_out=np.zeros((body.n_springs, body.n_outputs)) if closed else None,
-            springs="cubic" if _by_callback(model) else "native",
+            springs="cubic" if by_callback(model) else "native",
             feedback_delay=delay,
             control_period=period,
         )
@@ -140,107 +138,24 @@ def _require_moderate(body: Body) -> None:
         raise BodyFileError(f"masses: expected at least {1 / LARGEST:g}, got {least:g}")
 
 
-def readout_of_model(model: mujoco.MjModel) -> Array | None:
-    """The readout (L or L + 1, n_outputs) stored in the model's actuators, None without one."""
-    channels = _ids(model, mujoco.mjtObj.mjOBJ_ACTUATOR, "fb", model.nu)
-    if len(channels) == 0 or model.nuser_actuator == 0:
-        return None
-    return np.ascontiguousarray(model.actuator_user[channels].T)
-
-
 def readouts_of_model(model: mujoco.MjModel) -> dict[str, Array]:
     """The named readouts that `to_mjcf` stored, (L or L + 1, n_outputs) each.
 
     Raises:
         BodyFileError: the model is not an mcmj body, or a readout does not fit it.
     """
-    names = [name for name in _text_names(model) if name.startswith(READOUT_PREFIX)]
+    names = [name for name in text_names(model) if name.startswith(READOUT_PREFIX)]
     if not names:
         return {}
     body = body_of_model(model)
     readouts = {}
     for name in names:
-        values = _stored(model, name)
+        values = stored_numbers(model, name)
         assert values is not None
         if values.size not in (body.n_outputs * (body.n_springs + k) for k in (0, 1)):
             raise BodyFileError(f"{name}: {values.size} weights do not fit {body!r}")
         readouts[name.removeprefix(READOUT_PREFIX)] = values.reshape(-1, body.n_outputs)
     return readouts
-
-
-def provenance_of_model(model: mujoco.MjModel) -> dict[str, object] | None:
-    """The account that `to_mjcf` stored of where the body comes from.
-
-    Raises:
-        BodyFileError: it is not a JSON object.
-    """
-    text = _text(model, "provenance")
-    if text is None:
-        return None
-    try:
-        account = json.loads(text)
-    except (ValueError, RecursionError) as error:
-        raise BodyFileError(f"provenance: expected JSON ({error})") from error
-    if not isinstance(account, dict):
-        raise BodyFileError(f"provenance: expected a JSON object, got {text[:40]!r}")
-    return account
-
-
-def spring_law_of_model(model: mujoco.MjModel) -> str:
-    """Name of the spring law that the model was written with."""
-    return _text(model, "spring_law") or "native"
-
-
-def settings_of_model(model: mujoco.MjModel) -> dict[str, Any]:
-    """How the file says that its body is stepped: arguments of a Simulation."""
-    step, delay, period = _timing(model)
-    control = period or step
-    return {
-        "timestep": control,
-        "integrator": _integrator(model),
-        "springs": spring_law_of_model(model),
-        "feedback_delay": round(delay / control),
-        "substeps": max(1, round(control / step)),
-    }
-
-
-def _integrator(model: mujoco.MjModel) -> str:
-    """Ours, if the model has a numeric of its name; else the one of MuJoCo's that it runs."""
-    running = mujoco.mjtIntegrator(model.opt.integrator).name
-    found = running
-    for row in INTEGRATORS.values():
-        if row.by_callback:
-            if mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_NUMERIC, row.name) >= 0:
-                return row.name
-        elif running == f"mjINT_{row.mujoco_name.upper()}":
-            found = row.name
-    return str(found)
-
-
-def _timing(model: mujoco.MjModel) -> tuple[float, float, float]:
-    """Physics step, delay and sampling period of the fed-back lengths [s]; see mjcf."""
-    step = float(model.opt.timestep)
-    if model.nsensor == 0:
-        return step, 0.0, 0.0
-    delay, period = float(model.sensor_delay[0]), float(model.sensor_interval[0, 0])
-    return step, delay + step / 2 if delay > 0 else 0.0, period
-
-
-def _by_callback(model: mujoco.MjModel) -> bool:
-    springs = _ids(model, mujoco.mjtObj.mjOBJ_TENDON, "s", model.ntendon)
-    tags = model.tendon_user[springs, :1]
-    return tags.size > 0 and bool(np.isin(tags, (TAG, COUPLED_TAG)).all())
-
-
-def _ids(model: mujoco.MjModel, kind: mujoco.mjtObj, prefix: str, total: int) -> np.ndarray:
-    """Ids of <prefix>0, <prefix>1, .. up to the first that is missing."""
-    found: list[int] = []
-    while len(found) < total:
-        index = mujoco.mj_name2id(model, kind, f"{prefix}{len(found)}")
-        if index < 0:
-            break
-        found.append(index)
-    return np.array(found, dtype=np.int64)
 
 
 def _spring_ends(model: mujoco.MjModel, springs: np.ndarray, nodes: np.ndarray) -> np.ndarray:
@@ -256,7 +171,7 @@ def _spring_ends(model: mujoco.MjModel, springs: np.ndarray, nodes: np.ndarray) 
 
 
 def _spring_parameters(model: mujoco.MjModel, springs: np.ndarray) -> dict[str, Array]:
-    if _by_callback(model):
+    if by_callback(model):
         columns = model.tendon_user[springs, 2:7].T
         return dict(zip(("rest_lengths", "k1", "k3", "d1", "d3"), columns, strict=True))
     if model.tendon_stiffnesspoly[springs, 0].any() or model.tendon_dampingpoly[springs, 0].any():
@@ -283,13 +198,13 @@ def _weights(model: mujoco.MjModel, prefix: str, fixed: np.ndarray) -> Array:
     Of a body pushed along another direction than x, coefficients are products: its weights are
     stored beside them, and what is compiled of them must be the model (`require_same_physics`).
     """
-    channels = _ids(model, mujoco.mjtObj.mjOBJ_TENDON, prefix, model.ntendon)
-    driven = _ids(model, mujoco.mjtObj.mjOBJ_ACTUATOR, prefix, model.nu)
+    channels = ids(model, mujoco.mjtObj.mjOBJ_TENDON, prefix, model.ntendon)
+    driven = ids(model, mujoco.mjtObj.mjOBJ_ACTUATOR, prefix, model.nu)
     if len(driven) != len(channels):
         raise BodyFileError(
             f"{len(channels)} tendons {prefix}0, {prefix}1, .. but {len(driven)} such actuators"
         )
-    whole = _stored(model, f"w_{prefix}")
+    whole = stored_numbers(model, f"w_{prefix}")
     if whole is not None:
         return _shaped(whole, (len(fixed), len(channels)), f"w_{prefix}")
     weights = np.zeros((len(fixed), len(channels)))
@@ -303,38 +218,13 @@ def _weights(model: mujoco.MjModel, prefix: str, fixed: np.ndarray) -> Array:
             if int(joint[1]) >= len(fixed):
                 raise BodyFileError(f"tendon {prefix}{c} pushes a node that is not there")
             weights[int(joint[1]), c] = model.wrap_prm[wrap]
-    stored = _stored(model, f"fixed_w_{prefix}")
+    stored = stored_numbers(model, f"fixed_w_{prefix}")
     if stored is not None:
         weights[fixed] = _shaped(stored, (int(fixed.sum()), len(channels)), prefix)
     return weights
-
-
-def _stored(model: mujoco.MjModel, name: str) -> Array | None:
-    """Numbers that `to_mjcf` stored as text."""
-    text = _text(model, name)
-    if text is None:
-        return None
-    try:
-        return np.array([float(word) for word in text.split()])
-    except ValueError as error:
-        raise BodyFileError(f"{name}: expected numbers ({error})") from error
 
 
 def _shaped(values: Array, shape: tuple[int, ...], name: str) -> Array:
     if values.size != np.prod(shape):
         raise BodyFileError(f"{name}: expected {np.prod(shape)} numbers, got {values.size}")
     return values.reshape(shape)
-
-
-def _text_names(model: mujoco.MjModel) -> list[str]:
-    names = [mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_TEXT, i) for i in range(model.ntext)]
-    return [name for name in names if name]
-
-
-def _text(model: mujoco.MjModel, name: str) -> str | None:
-    index = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_TEXT, name)
-    if index < 0:
-        return None
-    start = model.text_adr[index]
-    found: str = model.text_data[start : start + model.text_size[index] - 1].decode()
-    return found

@@ -7,8 +7,6 @@ for the result instead of running the trial again, and takes over what a dead on
 """
 
 import json
-import os
-import socket
 import sqlite3
 import time
 from collections.abc import Iterator, Sequence
@@ -16,13 +14,13 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
+from mcmj.search.claims import LEASE, is_held, own_name
 from mcmj.search.experiment import DIVERGED, DONE, Outcome, Trial
 from mcmj.utils.errors import InvalidArgumentError, OutputError, StoreError
 from mcmj.utils.files import plain
 
 APPLICATION = 0x6D636D6A  # "mcmj", in the file's header
 SCHEMA = 2  # 2: keys know the experiment's code, the body file and MuJoCo's version
-LEASE = 60.0  # s: a claim that was not renewed for so long is void
 _PATIENCE = 60.0  # s to wait for another process's write
 _RETRY = 0.01  # s between tries where SQLite does not wait
 _BATCH = 500  # keys in one query
@@ -57,7 +55,7 @@ class TrialStore:
         self.path = Path(path)
         if not create and not self.path.is_file():
             raise InvalidArgumentError("store", "an existing file", self.path)
-        self._owner = _own_name()
+        self._owner = own_name()
         self._file: tuple[int, int] | None = None  # while it is being opened
         with self._translated():
             self._db = sqlite3.connect(self.path, timeout=_PATIENCE, isolation_level=None)
@@ -116,7 +114,7 @@ class TrialStore:
                 held = self._db.execute(
                     "SELECT owner, until FROM claims WHERE key = ?", [key]
                 ).fetchone()
-                if held is None or held[0] == self._owner or not _alive(*held):
+                if held is None or held[0] == self._owner or not is_held(*held):
                     self._db.execute(
                         "INSERT OR REPLACE INTO claims VALUES (?, ?, ?)",
                         [key, self._owner, time.time() + LEASE],
@@ -288,38 +286,3 @@ def _text(value: object) -> str:
 def _batches(keys: Sequence[str]) -> Iterator[Sequence[str]]:
     for first in range(0, len(keys), _BATCH):
         yield keys[first : first + _BATCH]
-
-
-def _own_name() -> str:
-    """host/process-namespace/process/start time/random: no two stores have the same."""
-    place = [socket.gethostname(), _process_space(), str(os.getpid()), _born(os.getpid())]
-    return "/".join([*place, os.urandom(4).hex()])
-
-
-def _alive(owner: str, until: float) -> bool:
-    """Whether a claim holds: renewed in time, and its process not seen to be dead."""
-    if not time.time() <= until <= time.time() + 2 * LEASE:  # far ahead: a wrong clock, or damage
-        return False
-    if owner.count("/") != 4:  # written by no store
-        return False
-    host, space, process, born, _ = owner.split("/")
-    if (host, space) != (socket.gethostname(), _process_space()) or not born:
-        return True  # from elsewhere: only time will tell
-    return _born(int(process)) == born
-
-
-def _process_space() -> str:
-    try:
-        return os.readlink("/proc/self/ns/pid")
-    except OSError:
-        return ""
-
-
-def _born(process: int) -> str:
-    """Start time of a process, "" if there is none or nobody says."""
-    try:
-        stat = Path(f"/proc/{process}/stat").read_text()
-    except OSError:
-        return ""
-    state, *rest = stat.rpartition(")")[2].split()
-    return "" if state == "Z" else rest[18]

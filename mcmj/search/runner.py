@@ -6,7 +6,8 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, wait
 from dataclasses import dataclass, field
 
-from mcmj.search.database import LEASE, TrialStore
+from mcmj.search.claims import LEASE
+from mcmj.search.database import TrialStore
 from mcmj.search.experiment import Outcome, Trial, check_versions, evaluate
 from mcmj.search.workers import Workers
 from mcmj.utils.errors import McmjError

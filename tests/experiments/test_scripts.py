@@ -12,7 +12,8 @@ from commands import run, start
 import mcmj
 from mcmj.core.random_body import draw_body
 from mcmj.learning.recipe import BODIES
-from mcmj.mjcf.read import load_model, provenance_of_model, readouts_of_model
+from mcmj.mjcf.kept import provenance_of_model
+from mcmj.mjcf.read import load_model, readouts_of_model
 
 SHORT = ["--duration", "8", "--washout", "2", "--free-run", "13", "--window", "12", "--no-video"]
 ON_CYCLE = ["--rest-runs", "0", "--held-runs", "0", "--rounds", "0"]

@@ -17,7 +17,8 @@ from mcmj.experiments.view import run as view
 from mcmj.learning.teaching import synchronise
 from mcmj.metrics.orbits import orbit_error
 from mcmj.mjcf.bundled import body_names, body_path, open_body
-from mcmj.mjcf.read import load_model, provenance_of_model, readouts_of_model
+from mcmj.mjcf.kept import provenance_of_model
+from mcmj.mjcf.read import load_model, readouts_of_model
 from mcmj.search.body_space import BodySpace
 from mcmj.utils.errors import OtherPhysicsWarning, UnknownNameError
 

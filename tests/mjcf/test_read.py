@@ -8,7 +8,8 @@ from hypothesis.extra.numpy import arrays
 
 import mcmj
 from mcmj import Body, from_mjcf, to_mjcf
-from mcmj.mjcf.read import load_model, provenance_of_model, readouts_of_model, spring_law_of_model
+from mcmj.mjcf.kept import provenance_of_model, spring_law_of_model
+from mcmj.mjcf.read import load_model, readouts_of_model
 from mcmj.utils.errors import InvalidArgumentError
 
 FIELDS = tuple(Body.__dataclass_fields__)

@@ -9,7 +9,8 @@ import pytest
 
 import mcmj
 from mcmj.core.integrators import INTEGRATORS
-from mcmj.mjcf.read import body_of_model, load_model, provenance_of_model, settings_of_model
+from mcmj.mjcf.kept import provenance_of_model, settings_of_model
+from mcmj.mjcf.read import body_of_model, load_model
 from mcmj.utils.errors import BodyFileError
 
 BODY = mcmj.to_mjcf(mcmj.random_body(0, 5), w_out=None)

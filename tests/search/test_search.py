@@ -17,7 +17,8 @@ from mcmj.experiments.limit_cycle import run as limit_cycle
 from mcmj.experiments.search import run as search
 from mcmj.experiments.search.cost import affordable, overhead
 from mcmj.learning.recipe import BODIES
-from mcmj.mjcf.read import load_model, provenance_of_model, readouts_of_model
+from mcmj.mjcf.kept import provenance_of_model
+from mcmj.mjcf.read import load_model, readouts_of_model
 from mcmj.search.experiment import evaluate
 from mcmj.search.study import Study
 from mcmj.search.workers import Inline
