@@ -25,6 +25,7 @@ extensions = ["myst_nb", "sphinx.ext.autodoc", "sphinx.ext.napoleon"]
 exclude_patterns = ["data", "**.ipynb_checkpoints"]
 html_theme = "furo"
 html_title = "mcmj"
+highlight_language = "none"  # equations and tables in docstrings
 html_static_path: list[str] = []
 myst_heading_anchors = 3
 nb_execution_mode = "cache"
