@@ -129,6 +129,7 @@ def practise_exercises(
 ) -> Practised:
     """Practise until every trial is good enough, each round those whose trial was not.
 
+    The best round is one with the fewest such trials, of these the one whose worst error is least.
     The simulation is left where it was.
 
     Args:
@@ -147,7 +148,8 @@ def practise_exercises(
                 lesson = replace(exercise.lesson, weight=practice.round_weight, own_share=share)
                 _try_lesson(course, lesson, practice.round_runs, on_steps)
     errors = tuple(max(each) for each in trials)
-    best = fits[errors.index(min(errors))]
+    ranks = [(sum(e > practice.good_enough for e in each), max(each)) for each in trials]
+    best = fits[ranks.index(min(ranks))]
     course.simulation.set_readout(best.w_out)
     return Practised(best, errors)
 

@@ -18,7 +18,7 @@ SPATIAL = TrunkSettings(
     height=0.4, depth=0.5, leg=0.38, hip=0.44, stance=0.5, mass=26.0,
     d1=(80.0, 720.0), d3=(250.0, 550.0), foot=0.03,
     muscle_stiffness=6570.0, muscle_damping=85.0, muscle_strength=600.0,
-    swing=0.076, lift=0.045, lags=(0.1, 0.14, 0.18, 0.22),
+    swing=0.076, lift=0.045, lags=(0.1, 0.17, 0.12, 0.22),
 )  # fmt: skip
 PARTS = (
     "regression", "practice", "rest", "push", "switch", "steps", "energy", "controls", "ground",
