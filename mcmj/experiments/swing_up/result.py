@@ -86,11 +86,9 @@ class Result:
 
     def _rate(self, runs: list[SwingUp]) -> dict[str, object]:
         tolerance = self.config.tolerance
-        firsts = [run.practice_errors[0] if run.practice_errors else np.inf for run in runs]
         kicked = [run.kicked_fraction for run in runs if run.kicked_fraction is not None]
         return {
             **success_rate([run.orbit_error < tolerance for run in runs]),
-            "without_practice": success_rate([error < tolerance for error in firsts]),
             "median_swing_up_time": float(np.median([run.swing_up_time for run in runs])),
             "mean_kicked_fraction": float(np.mean(kicked)) if kicked else None,
             "orbit_errors": [run.orbit_error for run in runs],
