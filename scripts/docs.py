@@ -16,7 +16,7 @@ A page names its commands in its front matter, with the figures to keep of each:
 A run leaves docs/data/perturb_seeds.json (its metrics.json) and the figures, in docs/figures.
 What stands between `<!-- commands -->` or `<!-- table RUN .. [at PATH] .. -->` and `<!-- end -->`
 is written from these. Rows of a table are templates over the metrics, those after `at PATH` once
-for every entry of the mapping there, whose key is {key}. Of several runs the metrics are
+for every entry of the mapping or list there, whose key or number is {key}. Of several runs the metrics are
 by name. See `Numbers` for the formats.
 """
 
@@ -180,7 +180,7 @@ def _rows(metrics: Mapping[str, Any], path: str) -> Iterator[Mapping[str, Any]]:
     found: Any = metrics
     for part in filter(None, path.strip("/").split("/")):
         found = found[part]
-    for key, entry in found.items():
+    for key, entry in found.items() if isinstance(found, Mapping) else enumerate(found, 1):
         if isinstance(entry, Mapping):
             yield {**entry, "key": key}
 
