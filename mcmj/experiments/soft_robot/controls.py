@@ -65,7 +65,7 @@ def _pushed(config: Config, gait: LearnedGait, on_steps: OnSteps) -> Table:
     How many are survived; and by how much they have moved the rhythm of the feet for good, in
     periods, which a tape's cannot.
     """
-    robot, impulse = gait.robot(), config.impulses[-1]
+    robot, impulse = gait.robot(), config.impulses[0]
     start, steps = robot.snapshot(), round((config.survive + 1.0) / robot.timestep)
     tape = robot.rollout(steps, record=("outputs", "qpos"))
     table: Table = {"impulse_N_s": impulse}
