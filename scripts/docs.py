@@ -16,8 +16,8 @@ A page names its commands in its front matter, with the figures to keep of each:
 A run leaves docs/data/perturb_seeds.json (its metrics.json) and the figures, in docs/figures.
 What stands between `<!-- commands -->` or `<!-- table RUN .. [at PATH] .. -->` and `<!-- end -->`
 is written from these. Rows of a table are templates over the metrics, those after `at PATH` once
-for every entry of the mapping or list there, whose key or number is {key}. Of several runs the metrics are
-by name. See `Numbers` for the formats.
+for every entry of the mapping or list there, whose key or number is {key}. Of several runs the
+metrics are by name. See `Numbers` for the formats.
 """
 
 import json
