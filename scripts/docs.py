@@ -157,7 +157,7 @@ def _table(asked: str) -> Iterator[str]:
     metrics = found if len(found) > 1 else found[names]
     rows = []
     for values in _rows(metrics, path):
-        with suppress(KeyError):  # an entry of another kind
+        with suppress(KeyError, TypeError):  # an entry of another kind
             rows += [Numbers().vformat(template, (), values) for template in templates]
     if not rows:
         raise SystemExit(f"docs: no row of {names} has the fields of {templates}")
