@@ -60,6 +60,12 @@ def train(
     return practise(course, target, practice, starts=starts, on_steps=on_steps)
 
 
+def training_time(target: Target, teaching: Teaching, practice: Practice) -> float:
+    """Of all runs together [s], if no round of practice is needed: lessons, and a trial each
+    from rest, from every output held, and from a push."""
+    return teaching.total + (2 + target.n_outputs) * practice.trial
+
+
 def disturbed(simulation: Simulation, seed: int) -> list[Array]:
     """Snapshots of the closed loop after disturbances of HELD seconds that it did not blow up in.
 

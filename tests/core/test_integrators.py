@@ -32,7 +32,7 @@ def test_a_row_runs_every_integrator_of_mujoco_and_no_other():
 @pytest.mark.parametrize("name", INTEGRATORS)
 def test_files_keep_the_integrator(body, name):
     model = mcmj.mjcf.read.load_model(to_mjcf(body, integrator=name))
-    assert mcmj.mjcf.read.settings_of_model(model)["integrator"] == name
+    assert mcmj.mjcf.kept.settings_of_model(model)["integrator"] == name
 
 
 @pytest.mark.parametrize("name", INTEGRATORS)

@@ -26,6 +26,7 @@ CONFIG = limit_cycle.Config(
     teaching=Teaching(duration=30.0, washout=10.0),
     practice=Practice(rounds=0, trial=12.0, trial_window=10.0),
 )
+TRIALS = 4  # from rest, after each of two outputs was held, after a push
 
 
 class StopError(Exception):
@@ -57,7 +58,7 @@ def test_an_interrupted_run_goes_on_bit_for_bit(small_chunks, tmp_path, parts):
     kept = limit_cycle.checkpoints(CONFIG, tmp_path, found)
     whole = limit_cycle.run_tasks(CONFIG, found)["quadratic"]
     with pytest.raises(StopError):
-        limit_cycle.run_tasks(CONFIG, found, kept, on_steps=stop_after(parts))
+        limit_cycle.run_tasks(CONFIG, found, kept, on_steps=stop_after(TRIALS - 1 + parts))
     assert len(list(tmp_path.iterdir())) == 2
     counted = []
     again = limit_cycle.run_tasks(CONFIG, found, kept, on_steps=counted.append)["quadratic"]
@@ -65,8 +66,8 @@ def test_an_interrupted_run_goes_on_bit_for_bit(small_chunks, tmp_path, parts):
         assert np.array_equal(getattr(again, name), getattr(whole, name)), name
     assert dataclasses.replace(again.fit, w_out=None) == dataclasses.replace(whole.fit, w_out=None)
     assert again.errors == whole.errors
-    assert sum(counted) == 36_000
-    assert counted[0] >= 21_000 + 1000 * (parts - 1)  # nothing taught or run twice
+    assert sum(counted) == 54_000
+    assert counted[0] >= 39_000 + 1000 * (parts - 1)  # nothing taught or run twice
     for checkpoint in kept.values():
         checkpoint.remove()
     assert not list(tmp_path.iterdir())
@@ -169,7 +170,7 @@ def test_a_run_does_not_go_on_from_a_damaged_checkpoint(small_chunks, tmp_path):
     found = limit_cycle.get_body(CONFIG)
     kept = limit_cycle.checkpoints(CONFIG, tmp_path, found)
     with pytest.raises(StopError):
-        limit_cycle.run_tasks(CONFIG, found, kept, on_steps=stop_after(4))
+        limit_cycle.run_tasks(CONFIG, found, kept, on_steps=stop_after(TRIALS + 3))
     (path,) = tmp_path.glob(".checkpoint-*.outputs")
     damaged = bytearray(path.read_bytes())
     damaged[100] ^= 1

@@ -10,7 +10,7 @@ from mcmj.experiments.body_source import BodySource
 from mcmj.learning.free_run import WINDOW
 from mcmj.learning.lessons import Teaching
 from mcmj.learning.practice import Practice
-from mcmj.learning.recipe import BODIES, PRACTICE, TEACHING
+from mcmj.learning.recipe import BODIES, PRACTICE, TEACHING, training_time
 from mcmj.metrics import orbits
 from mcmj.targets.limit_cycles import Target
 from mcmj.targets.named import named_targets, require_outputs
@@ -122,8 +122,9 @@ def of_seed(config: Any, index: int) -> Config:
 
 def total_steps(config: Config) -> int:
     """Control steps of a whole run, for a progress bar; rounds of practice are not foreseen."""
-    seconds = config.teaching.total + config.practice.trial + config.free_run
-    return config.seeds * len(config.targets) * round(seconds / config.timestep)
+    targets = config.targets.values()
+    training = sum(training_time(t, config.teaching, config.practice) for t in targets)
+    return config.seeds * round((training + len(targets) * config.free_run) / config.timestep)
 
 
 def check_task(config: Config, body: Body, wanted: Target) -> None:

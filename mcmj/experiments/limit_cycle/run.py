@@ -15,7 +15,7 @@ from mcmj.experiments.limit_cycle.loop_cost import closed_loop_cost
 from mcmj.experiments.limit_cycle.result import Result, TaskResult
 from mcmj.experiments.limit_cycle.seeds import SuccessOfSeeds
 from mcmj.learning.free_run import free_run, resume, window_errors
-from mcmj.learning.recipe import train
+from mcmj.learning.recipe import train, training_time
 from mcmj.learning.regression import Fit
 from mcmj.learning.teaching import synchronise
 from mcmj.metrics import orbits
@@ -167,7 +167,7 @@ def _run_task(
         done, fit = None, _ready(simulation, config, wanted, w_out, on_steps)
     else:
         done, fit = resumed
-        taught = config.teaching.total + config.practice.trial
+        taught = training_time(wanted, config.teaching, config.practice)
         on_steps(round(taught / config.timestep) + len(done))
     total, last = (round(s / config.timestep) for s in (config.free_run, config.window))
     first = free_run(

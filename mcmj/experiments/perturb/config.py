@@ -6,7 +6,7 @@ from mcmj.core.random_body import BodySettings
 from mcmj.experiments.body_source import BodySource
 from mcmj.learning.lessons import Teaching
 from mcmj.learning.practice import Practice
-from mcmj.learning.recipe import BODIES, PRACTICE, TEACHING
+from mcmj.learning.recipe import BODIES, PRACTICE, TEACHING, training_time
 from mcmj.metrics import orbits
 from mcmj.simulation.phases import Phase, RandomForces
 from mcmj.targets.limit_cycles import Target
@@ -104,5 +104,6 @@ def total_steps(config: Config) -> int:
     """Control steps of a whole run, for a progress bar."""
     runs = 1 + len(config.perturbations) + len(config.noise_curve)
     run_length = config.before + config.window + config.after
-    seconds = config.teaching.total + config.practice.trial + runs * run_length
-    return config.seeds * len(config.targets) * round(seconds / config.timestep)
+    targets = config.targets.values()
+    training = sum(training_time(t, config.teaching, config.practice) for t in targets)
+    return config.seeds * round((training + len(targets) * runs * run_length) / config.timestep)

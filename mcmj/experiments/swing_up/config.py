@@ -6,7 +6,7 @@ from mcmj.core.random_body import BodySettings
 from mcmj.experiments.limit_cycle import config as limit_cycle
 from mcmj.learning.lessons import Teaching
 from mcmj.learning.practice import Practice
-from mcmj.learning.recipe import BODIES, PRACTICE, TEACHING
+from mcmj.learning.recipe import BODIES, PRACTICE, TEACHING, training_time
 from mcmj.utils.validation import require_count, require_number
 
 
@@ -65,5 +65,7 @@ class Config:
 
 def total_steps(config: Config) -> int:
     """Control steps of a whole run, for a progress bar; rounds of practice are not foreseen."""
-    seconds = config.teaching.total + config.practice.trial + (1 + config.kicks) * config.free_run
-    return config.seeds * len(config.of_seed(0).targets) * round(seconds / config.timestep)
+    targets = config.of_seed(0).targets.values()
+    training = sum(training_time(t, config.teaching, config.practice) for t in targets)
+    runs = len(targets) * (1 + config.kicks)
+    return config.seeds * round((training + runs * config.free_run) / config.timestep)
