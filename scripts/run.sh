@@ -173,6 +173,9 @@ extra=$(extra_of "$1")
 { python_ready && gl_ready; } || set_up </dev/null >&2 9<"$0"
 
 # The program gets the rendering that was seen to work, unless the user chose one.
+# modules are compiled when they are first used (see above): that must be kept, or every start
+# takes some seconds more
+unset PYTHONDONTWRITEBYTECODE
 case $gl in egl | osmesa) export MUJOCO_GL="${MUJOCO_GL:-$gl}" ;; esac
 
 name=$1
