@@ -172,10 +172,10 @@ case ${1:-} in '' | -h | --help | help) usage; exit ;; esac
 extra=$(extra_of "$1")
 { python_ready && gl_ready; } || set_up </dev/null >&2 9<"$0"
 
-# The program gets the rendering that was seen to work, unless the user chose one.
-# modules are compiled when they are first used (see above): that must be kept, or every start
-# takes some seconds more
+# Modules are compiled when they are first used (see above). If that were not kept, every start
+# would take some seconds more.
 unset PYTHONDONTWRITEBYTECODE
+# The program gets the rendering that was seen to work, unless the user chose one.
 case $gl in egl | osmesa) export MUJOCO_GL="${MUJOCO_GL:-$gl}" ;; esac
 
 name=$1
