@@ -25,7 +25,7 @@ def or_lost(work: Callable[[], Found], lost: Lost) -> Found | Lost:
 def finer(config: Stepped) -> list[Stepped]:
     """An experiment's config, and the same with half its `timestep`, and with a quarter.
 
-    Springs of the fourth power soon outrun a time step that is stable at rest.
+    Cubic springs and dampers may make too long a time step that is stable at rest.
     """
     return [replace(config, timestep=config.timestep / 2**k) for k in range(HALVINGS + 1)]
 

@@ -75,8 +75,8 @@ class Practised:
 
     Attributes:
         fit: of the best round; the simulation has its readout.
-        errors: of the worst trial after the first fit and after every round; infinite where
-            it blew up.
+        errors: of the worst trial, from whatever start, after the first fit and after every
+            round; infinite where it blew up.
     """
 
     fit: Fit

@@ -40,7 +40,7 @@ class Config:
         refine: steps so much smaller for a second after a kick, and during a push.
         diffusion_noise: on the lengths, for the phase diffusion [m].
         teaching: how the readout is taught, if it is.
-        practice: how the body then practises from rest.
+        practice: how the body then practises, from rest and after disturbances.
     """
 
     task: str = "van_der_pol"

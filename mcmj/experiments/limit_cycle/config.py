@@ -51,7 +51,7 @@ class Config:
         measure_cost: measure what a step in closed loop costs in MuJoCo.
         settings: what a random body is drawn from.
         teaching: how the readout is taught.
-        practice: how the body then practises from rest.
+        practice: how the body then practises, from rest and after disturbances.
     """
 
     task: str = "all"

@@ -41,7 +41,7 @@ class Config:
         engine: mujoco, or twin: faster, the same to rounding.
         settings: what a random body is drawn from.
         teaching: how the readout is taught.
-        practice: how the body then practises from rest.
+        practice: how the body then practises, from rest and after disturbances.
     """
 
     task: str = "quadratic"

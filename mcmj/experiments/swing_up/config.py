@@ -34,7 +34,7 @@ class Config:
             at about 0.05 m/s.
         settings: what a random body is drawn from.
         teaching: how the readout is taught, runs from rest included.
-        practice: how the body then practises from rest.
+        practice: how the body then practises, from rest and after disturbances.
     """
 
     task: str = "all"
