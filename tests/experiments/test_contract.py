@@ -26,7 +26,7 @@ TINY = {
     "certify": "--task quadratic --body quadratic --free-run 15 --window 13 --recovery 22 "
     "--scales 1 --phases 1 --kicks 0.5 --pushes 1 --copies 4 --refine 2",
     "design": "--nodes 6 --seeds 2 --evaluations 3 --checks 1 --judged 1 --free-run 26 --duration "
-    "12 --washout 4 --parts bodies smallest --sizes 4 --workers 1",
+    "12 --washout 4 --parts bodies smallest --tasks van_der_pol --sizes 4 --workers 1",
     "drive": "--nodes 8 --rounds 1 --population 2 --elites 2 --time-limit 8 --drive 4",
     "emulate": "--targets van_der_pol --integrators Euler --steps-ms 1 2 --horizon 1",
     "filters": "--tasks volterra --nodes 10 --train 3 --washout 1 --test 2 --engine twin",

@@ -28,21 +28,18 @@ def write(result: Result, folder: Path) -> None:
 def show(result: Result, console: Console) -> None:
     """The result as tables."""
     config = result.config
-    columns = (
-        "nodes",
-        "random",
-        "random search",
-        "designed",
-        "bodies tried at random",
-        "for designs",
-    )
-    title = f"{config.task}: bodies below {100 * config.threshold:g} % under unseen noise"
-    table = table_of(title, *columns, words=0)
-    rows = {**result.sizes}
+    columns = ("task", "nodes", *KINDS.values(), "bodies tried at random", "for designs")
+    rows = [
+        (task, nodes, found)
+        for task, sizes in result.smallest.items()
+        for nodes, found in sorted(sizes.items())
+    ]
     if result.bodies is not None:
-        rows[config.settings.nodes] = result.bodies
-    for nodes, found in sorted(rows.items()):
-        table.add_row(str(nodes), *_cells(found))
+        rows.append((config.task, config.settings.nodes, result.bodies))
+    title = f"bodies below {100 * config.threshold:g} % under unseen noise"
+    table = table_of(title, *columns)
+    for task, nodes, found in rows:
+        table.add_row(task, str(nodes), *_cells(found))
     if rows:
         console.print(table)
     if result.predictors is not None:

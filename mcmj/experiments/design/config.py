@@ -28,11 +28,12 @@ class Config(one_body.Config):
             to fail.
         seed: of the first body; its proposals and the noise of its search have the same.
         seeds: number of bodies, of consecutive seeds.
-        parts: bodies: one from each random body; smallest: the same with every number of nodes
-            of sizes; predictors: which measure of a random body before teaching tells whether
-            it will learn; pareto: exact or robust against noise on the lengths, by several weights
-            of both.
-        sizes: numbers of nodes of the part smallest.
+        parts: bodies: one from each random body; smallest: the same for every task of tasks and
+            number of nodes of sizes; predictors: which measure of a random body before teaching
+            tells whether it will learn; pareto: exact or robust against noise on the lengths, by
+            several weights of both.
+        tasks: of the part smallest ..
+        sizes: .. and its numbers of nodes.
         measured: number of random bodies of the part predictors.
         varied: what may differ from the random body: springs, rest_lengths, positions, masses,
             feedback (mcmj.search.body_space).
@@ -53,6 +54,7 @@ class Config(one_body.Config):
     seed: Annotated[int, tyro.conf.arg(aliases=["--first-seed"])] = 0
     seeds: int = 10
     parts: tuple[str, ...] = ("bodies",)
+    tasks: tuple[str, ...] = ("van_der_pol", "quadratic", "lissajous")
     sizes: tuple[int, ...] = (3, 4, 5, 6, 8, 10)
     measured: int = 1000
     tries: int = 100
@@ -69,15 +71,18 @@ class Config(one_body.Config):
             require_count("workers", self.workers, 1)
         require_count("measured", self.measured, 10, MAX_TRIALS)
         # these build, so check, the configs of all of them
-        self.trials, self.measurements, self.trade_offs  # noqa: B018
+        self.designs, self.smallest, self.measurements, self.trade_offs  # noqa: B018
 
     @property
-    def trials(self) -> dict[str, dict[int, list[Trial]]]:
-        """Designs by part and number of nodes: one for each seed."""
-        usual = self.settings.nodes
-        found = {"bodies": {usual: self._of(usual)}}
-        found["smallest"] = {nodes: self._of(nodes) for nodes in self.sizes}
-        return {part: found[part] for part in self.parts if part in found}
+    def designs(self) -> list[Trial]:
+        """Of the part bodies: one for each seed."""
+        return self._of(self.task, self.settings.nodes) if "bodies" in self.parts else []
+
+    @property
+    def smallest(self) -> dict[str, dict[int, list[Trial]]]:
+        """Of the part smallest, by task and number of nodes: one for each seed."""
+        tasks = self.tasks if "smallest" in self.parts else ()
+        return {task: {nodes: self._of(task, nodes) for nodes in self.sizes} for task in tasks}
 
     @property
     def measurements(self) -> list[Trial]:
@@ -103,9 +108,10 @@ class Config(one_body.Config):
         )
         return [Trial(TRADE_OFF, replace(one, seed=self.seed + k)) for k in range(self.seeds)]
 
-    def _of(self, nodes: int) -> list[Trial]:
+    def _of(self, task: str, nodes: int) -> list[Trial]:
         names = [field.name for field in fields(one_body.Config)]
         one = one_body.Config(**{name: getattr(self, name) for name in names})
         return [
-            Trial(DESIGN, replace(one, nodes=nodes, seed=self.seed + k)) for k in range(self.seeds)
+            Trial(DESIGN, replace(one, task=task, nodes=nodes, seed=self.seed + k))
+            for k in range(self.seeds)
         ]

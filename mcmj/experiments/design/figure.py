@@ -1,5 +1,7 @@
 """Designed bodies beside random ones: errors, bodies tried, numbers of nodes, the best body."""
 
+from collections.abc import Mapping
+
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -24,7 +26,7 @@ def figures(result: Result) -> dict[str, Figure]:
     found = {}
     if result.bodies is not None:
         found["design"] = design_figure(result, result.bodies)
-    if result.sizes:
+    if result.smallest:
         found["smallest"] = smallest_figure(result)
     if result.predictors is not None:
         found["predictors"] = predictors_figure(result, result.predictors)
@@ -69,12 +71,22 @@ def _draw_tried(axes: Axes, designs: Designs) -> None:
 
 
 def smallest_figure(result: Result) -> Figure:
-    """Share of the bodies that learn the task against the number of nodes."""
-    figure = new_figure(6.0, 4.2)
-    axes = figure.subplots()
-    nodes = np.array(list(result.sizes))
+    """Share of the bodies that learn a task against the number of nodes, a panel for each task."""
+    count = len(result.smallest)
+    figure = new_figure(1.2 + 4.2 * count, 4.2)
+    panels = figure.subplots(1, count, sharey=True, squeeze=False)[0]
+    for axes, (task, sizes) in zip(panels, result.smallest.items(), strict=True):
+        _draw_sizes(axes, sizes)
+        axes.set_title(_task_title(task))
+    panels[0].set(ylabel="share of the bodies that learn it", ylim=(-0.03, 1.03))
+    panels[0].legend(frameon=False, loc="upper left")
+    return figure
+
+
+def _draw_sizes(axes: Axes, sizes: Mapping[int, Designs]) -> None:
+    nodes = np.array(sorted(sizes))
     for kind, label in KINDS.items():
-        counts = [(found.successes(kind), len(found.bodies)) for found in result.sizes.values()]
+        counts = [(sizes[n].successes(kind), len(sizes[n].bodies)) for n in nodes]
         rates = np.array([count / total for count, total in counts])
         spans = np.abs(np.array([wilson_interval(*pair) for pair in counts]).T - rates)
         shift = 0.08 * (list(KINDS).index(kind) - 1)  # bars side by side
@@ -82,12 +94,9 @@ def smallest_figure(result: Result) -> Figure:
             nodes + shift, rates, yerr=spans, fmt="o-", ms=5, capsize=3, color=COLOURS[kind],
             label=label,
         )  # fmt: skip
-    axes.set(xlabel="nodes", ylabel="share of the bodies that learn it", ylim=(-0.03, 1.03))
-    axes.set_title(_title(result))
-    axes.legend(frameon=False)
+    axes.set_xlabel("nodes")
     axes.grid(alpha=0.3)
     count_in_whole_numbers(axes)
-    return figure
 
 
 def predictors_figure(result: Result, predictors: Predictors) -> Figure:
@@ -133,4 +142,9 @@ def pareto_figure(result: Result, fronts: Fronts) -> Figure:
 
 
 def _title(result: Result) -> str:
-    return TITLES.get(result.config.task, result.config.task.replace("_", " "))
+    return _task_title(result.config.task)
+
+
+def _task_title(task: str) -> str:
+    """Of a figure."""
+    return TITLES.get(task, task.replace("_", " "))

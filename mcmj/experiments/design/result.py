@@ -1,5 +1,6 @@
 """What came of the designs: how many bodies learn a task, drawn, searched at random, designed."""
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -79,35 +80,33 @@ class Designs:
 
 @dataclass(frozen=True)
 class Result:
-    """Designs by part and number of nodes, what tells success beforehand, exact or robust."""
+    """What the parts found.
+
+    Attributes:
+        bodies: designs of the part bodies.
+        smallest: those of the part smallest, by task and number of nodes.
+        predictors: what tells success beforehand.
+        fronts: exact or robust.
+    """
 
     config: Config
-    designs: dict[str, dict[int, Designs]]
+    bodies: Designs | None
+    smallest: dict[str, dict[int, Designs]]
     predictors: Predictors | None = None
     fronts: Fronts | None = None
 
-    @property
-    def bodies(self) -> Designs | None:
-        """Those of the part bodies."""
-        return next(iter(self.designs.get("bodies", {}).values()), None)
-
-    @property
-    def sizes(self) -> dict[int, Designs]:
-        """Those of the part smallest, by number of nodes."""
-        return dict(sorted(self.designs.get("smallest", {}).items()))
-
-    def smallest(self, kind: str) -> int | None:
-        """Fewest nodes with which a body of a kind learned the task; None: none did."""
-        return next((n for n, found in self.sizes.items() if found.successes(kind)), None)
+    def fewest(self, task: str, kind: str) -> int | None:
+        """Fewest nodes with which a body of a kind learned a task; None: none did."""
+        sizes = self.smallest[task]
+        return min((n for n, found in sizes.items() if found.successes(kind)), default=None)
 
     @property
     def champions(self) -> dict[str, str]:
-        """MJCF by file name: the best of the part bodies, the smallest of the other."""
-        fewest = self.smallest("designed")
-        chosen = {
-            "designed": self.bodies,
-            "smallest": None if fewest is None else self.sizes[fewest],
-        }
+        """MJCF by file name: the best of the part bodies, the smallest for every task."""
+        chosen = {"designed": self.bodies}
+        for task, sizes in self.smallest.items():
+            if (nodes := self.fewest(task, "designed")) is not None:
+                chosen["smallest_" + re.sub(r"[^\w-]", "_", task)] = sizes[nodes]
         best = {name: found.best for name, found in chosen.items() if found is not None}
         return {name: body["xml"] for name, body in best.items() if body is not None}
 
@@ -118,10 +117,14 @@ class Result:
         table: dict[str, object] = {}
         if self.bodies is not None:
             table[task] = self.bodies.metrics
-        if self.sizes:
-            fewest = {kind: self.smallest(kind) for kind in KINDS}
-            by_nodes = {str(n): found.metrics for n, found in self.sizes.items()}
-            table["smallest"] = {task: {**fewest, "by_nodes": by_nodes}}
+        if self.smallest:
+            table["smallest"] = {
+                one: {
+                    **{kind: self.fewest(one, kind) for kind in KINDS},
+                    "by_nodes": {str(n): found.metrics for n, found in sizes.items()},
+                }
+                for one, sizes in self.smallest.items()
+            }
         if self.predictors is not None:
             table["predictors"] = {task: self.predictors.metrics}
         if self.fronts is not None:

@@ -4,6 +4,7 @@ from collections.abc import Callable
 from functools import partial
 from itertools import chain
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -25,11 +26,9 @@ def total_bodies(config: Config) -> int:
 
 
 def _all(config: Config) -> list[Trial]:
-    return [*_designs(config), *config.measurements, *config.trade_offs]
-
-
-def _designs(config: Config) -> list[Trial]:
-    return list(chain.from_iterable(t for sizes in config.trials.values() for t in sizes.values()))
+    sizes = chain.from_iterable(sizes.values() for sizes in config.smallest.values())
+    designs = [*config.designs, *chain.from_iterable(sizes)]
+    return [*designs, *config.measurements, *config.trade_offs]
 
 
 def run(
@@ -52,18 +51,22 @@ def run(
         TrialStore(config.store or store) as kept,
     ):
         done = run_trials(_all(config), kept, workers, on_outcome=partial(_tell, on_body)).outcomes
-    designs = {
-        part: {
-            nodes: Designs([done[trial.key].metrics for trial in trials], config.threshold)
-            for nodes, trials in sizes.items()
-        }
-        for part, sizes in config.trials.items()
+
+    def of(trials: list[Trial]) -> list[dict[str, Any]]:
+        return [done[trial.key].metrics for trial in trials]
+
+    smallest = {
+        task: {nodes: Designs(of(trials), config.threshold) for nodes, trials in sizes.items()}
+        for task, sizes in config.smallest.items()
     }
-    measured = [done[trial.key].metrics for trial in config.measurements]
-    known = [one for one in measured if one]  # a body that blew up has none
-    predictors = Predictors(known, config.threshold) if known else None
-    fronts = Fronts([done[trial.key].metrics for trial in config.trade_offs], config.threshold)
-    return Result(config, designs, predictors, fronts if fronts.bodies else None)
+    known = [one for one in of(config.measurements) if one]  # a body that blew up has none
+    return Result(
+        config,
+        Designs(of(config.designs), config.threshold) if config.designs else None,
+        smallest,
+        Predictors(known, config.threshold) if known else None,
+        Fronts(of(config.trade_offs), config.threshold) if config.trade_offs else None,
+    )
 
 
 def _tell(on_body: OnBody, trial: Trial, outcome: Outcome) -> None:
