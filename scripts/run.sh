@@ -24,7 +24,7 @@ usage() {
     for f in "$root"/mcmj/experiments/*/command.py; do
         echo "    $(basename "$(dirname "$f")")"
     done
-    echo "    test    (pytest, in the repository's folder), or any program of .venv/bin"
+    echo "    test    (pytest on all cores), or any program of .venv/bin"
 }
 
 # A candidate may be too old, built without ssl, or a pyenv shim that cannot run. Prints the
@@ -182,7 +182,7 @@ name=$1
 shift
 if [ "$name" = test ]; then
     cd "$root"
-    exec "$vpy" -m pytest "$@"
+    exec "$vpy" -m pytest -n logical --maxprocesses 4 "$@"
 elif [ -f "$root/mcmj/experiments/$name/command.py" ]; then
     exec "$vpy" -m mcmj "$name" "$@"
 elif [ -f "$venv/bin/$name" ]; then

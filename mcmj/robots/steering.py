@@ -9,6 +9,7 @@ on u, but is taught under many u, or they would throw the loop out of its rhythm
 """
 
 from collections.abc import Callable, Sequence
+from itertools import pairwise
 
 import numpy as np
 
@@ -27,9 +28,9 @@ TURN, BRAKE = (0.03, 0.015, 0.012), 0.14
 LOWEST = {"turn": -1.0, "brake": 0.0}  # of u, by what it does; the largest is 1
 RAMP = 0.5  # s, from one value of u to the next, and in which a teacher begins
 TELL = 0.1  # s, between an operator's commands
-# how a way is straightened: short walks [s], so many; turning over curvature, as a first guess
-# [deg m/s]; the largest curvature [1/m]
-WALK, WALKS, SLOPE, STEEPEST = 6.0, 4, 60.0, 0.5
+# how a way is straightened: walks of so long [s], so many at most; a curvature to try first [1/m],
+# and the largest; straight enough [deg/s]
+WALK, WALKS, FIRST, STEEPEST, STRAIGHT = 15.0, 10, 0.1, 0.5, 1.0
 
 
 def steering_bias(trunk: Trunk, steer: str) -> Array:
@@ -71,32 +72,49 @@ def course_of_inputs(steer: str, seed: int, hold: float) -> Callable[[Array], Ar
 def straight_curvature(trunk: Trunk, gait: str, pace: float) -> float:
     """What to tell the feet [1/m], so that a robot walks straight ahead under a teacher.
 
-    The legs of a random trunk do not pull alike. By the secant method from how the robot turns in
-    short walks; the best one counts.
+    The legs of a random trunk do not pull alike. By bisection from how the robot turns in walks;
+    the best one counts, for how it turns may jump: a pace rolls, to one side or the other.
     """
     robot, tried = new_robot(trunk), dict[float, float]()
     stand(robot)
     start, told = robot.snapshot(), 0.0
-    for _ in range(WALKS):
+    while len(tried) < WALKS and abs(told) <= STEEPEST:
         robot.restore(start)
-        target = muscle_target(trunk, gait, pace, curvature=told)
-        tried[told] = _turning(robot, trunk, target)
-        (one, rate), (other, other_rate) = (list(tried.items())[-2:] * 2)[:2]
-        slope = (other_rate - rate) / (other - one) if other != one else SLOPE
-        told -= tried[told] / max(slope, SLOPE / 4)
-        told = float(np.clip(told, -STEEPEST, STEEPEST))
-        if told in tried:
+        tried[told] = _turning(robot, trunk, muscle_target(trunk, gait, pace, curvature=told))
+        if abs(tried[told]) < STRAIGHT:
             break
+        told = next_curvature(tried)
     return min(tried, key=lambda told: abs(tried[told]))
 
 
+def next_curvature(tried: dict[float, float]) -> float:
+    """Which one to try next, from how a robot turns under those tried.
+
+    Between the two neighbours that turn least, one to each side; beyond all, if none do so.
+    """
+    known = sorted(tried.items())
+    pairs = [
+        (abs(rate) + abs(other), (one + two) / 2)
+        for (one, rate), (two, other) in pairwise(known)
+        if rate * other < 0.0
+    ]
+    if pairs:
+        return min(pairs)[1]
+    (low, rate), (high, _) = known[0], known[-1]
+    reach = max(FIRST, high - low)
+    return low - reach if rate > 0.0 else high + reach
+
+
 def _turning(robot: Reservoir, trunk: Trunk, target: Target) -> float:
-    """Of a robot under a teacher, to the left [deg/s]; infinite if it blows up."""
+    """Of a robot under a teacher, to the left [deg/s], when it has settled; inf if it blows up."""
     step, every = robot.timestep, round(SAMPLE / robot.timestep)
     times = step * np.arange(round(WALK / step))
     told = np.minimum(1.0, times / RAMP)[:, None] * target.sample(times)
-    run = robot.rollout(offset=told, gate=0.0, record=("qpos",)).thinned(every)
-    heading = headings(poses(trunk, run.get("qpos")))[len(run) // 3 :]
+    try:
+        run = robot.rollout(offset=told, gate=0.0, record=("qpos",)).thinned(every)
+    except DivergenceError:
+        return np.inf
+    heading = headings(poses(trunk, run.get("qpos")))[len(run) // 2 :]
     return float(np.degrees(heading[-1] - heading[0])) / (SAMPLE * (len(heading) - 1))
 
 

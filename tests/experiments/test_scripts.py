@@ -316,7 +316,7 @@ def test_all_parts_of_soft_robot(tmp_path):
     """Every part says something of every gait; seconds of learning are too few for more."""
     options = ["--gaits", "trot", "bound", "--no-video", "--walking", "4", "--judged", "2"]
     options += ["--rounds", "1", "--round-duration", "6", "--trial", "3", "--survive", "1.5"]
-    options += ["--teaching", "5", "--pushes", "1", "--impulses", "10"]
+    options += ["--teaching", "5", "--pushes", "1", "--impulses", "10", "--symbols", "400"]
     status, _, err = run("soft_robot", *options, "--steps-ms", "0.2", "--out", tmp_path)
     assert status == 0, err
     metrics = metrics_of(tmp_path)["metrics"]
@@ -326,6 +326,7 @@ def test_all_parts_of_soft_robot(tmp_path):
         assert metrics["energy"][name]["balance_error"] < 1e-3
         assert metrics["push"]["survived"][name]["10"] == 2
         assert metrics["controls"][name]["frozen"]["speed_m_s"] == pytest.approx(0.0, abs=0.05)
+        assert metrics["controls"][name]["capacity"]["standing"]["memory_capacity"] > 1.0
         assert set(metrics["ground"][name]) == {
             "slope -0.05", "slope -0.02", "slope 0.02", "slope 0.05", "step 10 mm", "step 20 mm",
         }  # fmt: skip

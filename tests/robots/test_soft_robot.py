@@ -6,10 +6,17 @@ from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
 from mcmj.core.body import Body
-from mcmj.experiments.soft_robot.config import SPATIAL
+from mcmj.experiments.soft_robot.config import SPATIAL, Config
+from mcmj.experiments.soft_robot.economy import VARIED, designed
 from mcmj.robots.energy import energy_balance
 from mcmj.robots.quadruped import GRAVITY
-from mcmj.robots.steering import PointFollower, course_of_inputs, steering_bias
+from mcmj.robots.steering import (
+    PointFollower,
+    course_of_inputs,
+    next_curvature,
+    steering_bias,
+    straight_curvature,
+)
 from mcmj.robots.trunk import Trunk, draw_trunk, muscle_lengths, muscle_target
 from mcmj.robots.trunk_walker import heading_ahead, new_robot, poses, stand, walk
 from mcmj.robots.walk_metrics import headings
@@ -209,6 +216,50 @@ def test_under_a_teacher_it_turns_as_told():
         turned[-1] *= np.sign(headings(poses(trunk, run.get("qpos")))[-1])
     assert turned[0] < -15.0
     assert turned[1] > 15.0
+
+
+@pytest.mark.parametrize("rate", [
+    lambda c: 60.0 * (c - 0.23),
+    lambda c: 60.0 * (c + 0.41),
+    lambda c: 9.0 * np.sign(c - 0.13) + 20.0 * c,  # it jumps: rolls to one side or the other
+    lambda c: 300.0 * c**3 - 20.0 * c + 1.7,  # three roots
+])  # fmt: skip
+def test_curvatures_close_in_on_where_the_turning_changes_sign(rate):
+    tried = {0.0: rate(0.0)}
+    while len(tried) < 12:
+        told = next_curvature(tried)
+        tried[told] = rate(told)
+    best = min(tried, key=lambda c: abs(tried[c]))
+    assert rate(best - 0.01) < 0.0 < rate(best + 0.01) or rate(best + 0.01) < 0.0 < rate(
+        best - 0.01
+    )
+
+
+@pytest.mark.slow
+def test_a_pace_that_circles_walks_straight_when_told_to():
+    trunk, turned = draw_trunk(107, SPATIAL), []
+    for curvature in (0.0, straight_curvature(trunk, "pace", 15.0)):
+        robot = new_robot(trunk)
+        stand(robot)
+        target = muscle_target(trunk, "pace", 15.0, curvature=curvature)
+        times = robot.timestep * np.arange(50_000)
+        told = np.minimum(1.0, 2.0 * times)[:, None] * target.sample(times)
+        run = robot.rollout(offset=told, gate=0.0, record=("qpos",)).thinned(2500)
+        turned.append(np.degrees(np.diff(headings(poses(trunk, run.get("qpos")))[-6:]).mean()))
+    assert abs(turned[0]) > 5.0
+    assert abs(turned[1]) < 2.0
+
+
+def test_designs_begin_with_the_robot_as_it_is():
+    config = Config()
+    assert designed(config, "pace", np.zeros(len(VARIED))) == config
+    other = designed(config, "pace", np.full(len(VARIED), np.log(1.1)))
+    assert other.pace == pytest.approx(1.1 * config.pace)
+    assert other.trunk.swing == pytest.approx(1.1 * SPATIAL.swing)
+    assert other.trunk.d1 == pytest.approx(tuple(1.1 * np.array(SPATIAL.d1)))
+    changed = np.flatnonzero(np.array(other.trunk.lags) != SPATIAL.lags)
+    assert changed.tolist() == [2]
+    assert other.trunk.k1 == SPATIAL.k1
 
 
 def test_an_operator_leads_a_point_that_turns_as_told_through_its_points():

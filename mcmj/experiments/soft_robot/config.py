@@ -12,7 +12,7 @@ from mcmj.robots.trunk import TrunkSettings
 from mcmj.robots.trunk_walker import STEPS
 from mcmj.targets.gaits import GAITS
 from mcmj.utils.errors import InvalidArgumentError
-from mcmj.utils.validation import require_names, require_number
+from mcmj.utils.validation import require_count, require_names, require_number
 
 SPATIAL = TrunkSettings(
     height=0.4, depth=0.5, leg=0.38, hip=0.44, stance=0.5, mass=26.0,
@@ -39,7 +39,8 @@ class Config(trunk.Config):
             count falls; switch: of the readout while walking; steps: the same walk at other time
             steps; energy: where the work goes; controls: shuffled and frozen lengths, a tape in
             place of the loop; ground: slopes and steps; cut: springs, and learning again; turn,
-            brake: a robot that an input steers (turn: with a figure of eight).
+            brake: a robot that an input steers (turn: with a figure of eight). By name only:
+            economy: a robot designed for its cost of transport.
         pace: of the gaits, as many times faster than mcmj.targets.gaits.
         walking: a walk of each gait after learning [s] ..
         judged: .. whose last part is measured [s].
@@ -48,8 +49,10 @@ class Config(trunk.Config):
         impulses: sizes of the pushes [N s], for 0.1 s.
         survive: a push or switch is survived if the robot does not fall for so long [s].
         steps_ms: time steps of the part steps [ms].
+        symbols: that disturb the muscles while the trunk's capacity is measured.
         slopes, heights: of the ground, over 1, and of steps up and down in it [m].
         cut: share of the springs that are cut.
+        designs: robots tried by the part economy.
         steered: gait of the robots that an input steers ..
         hold: .. how long its values are held while they learn [s].
         told: values of the input at which they are measured.
@@ -59,16 +62,18 @@ class Config(trunk.Config):
         learning: how they learn.
     """
 
-    known_parts: ClassVar[tuple[str, ...]] = PARTS
+    known_parts: ClassVar[tuple[str, ...]] = (*PARTS, "economy")
 
     parts: tuple[str, ...] = PARTS
     pace: float = 15.0
     impulses: tuple[float, ...] = (20.0, 40.0, 80.0)
     survive: float = 6.0
     steps_ms: tuple[float, ...] = (0.2, 0.4)
+    symbols: int = 2000
     slopes: tuple[float, ...] = (-0.05, -0.02, 0.02, 0.05)
     heights: tuple[float, ...] = (0.01, 0.02)
     cut: float = 0.1
+    designs: int = 100
     steered: str = "bound"
     hold: float = 2.0
     told: tuple[float, ...] = (-1.0, -0.8, -0.4, 0.0, 0.4, 0.8, 1.0)
@@ -84,6 +89,8 @@ class Config(trunk.Config):
     def __post_init__(self) -> None:
         super().__post_init__()
         require_names("steered", (self.steered,), GAITS)
+        require_count("designs", self.designs, 1)
+        require_count("symbols", self.symbols, 400)
         require_number("cut", self.cut, 0.0, 0.5, open_low=True)
         for name in ("gain", "hold"):
             require_number(name, getattr(self, name), 0.0, open_low=True)
@@ -115,6 +122,7 @@ def total_steps(config: Config) -> int:
         "controls": 3 * config.survive + pushes * config.survive,
         "ground": (len(config.slopes) + len(config.heights)) * config.judged,
         "cut": learning.total + 2 * walking,
+        "economy": config.designs * (learning.warm_up + learning.round_duration + learning.trial),
         **dict.fromkeys(LOWEST, steered / len(config.gaits)),
     }
     seconds = config.seeds * (learning.total + walking) + sum(parts[p] for p in config.parts)

@@ -6,8 +6,11 @@ from mcmj.experiments.blow_ups import or_lost
 from mcmj.experiments.soft_robot.config import Config
 from mcmj.experiments.trunk.parts import end_of
 from mcmj.experiments.trunk.result import LearnedGait, Table
+from mcmj.metrics.capacity import processing_capacity
 from mcmj.robots.recorded_walk import PUSH_DURATION
-from mcmj.robots.trunk_walker import has_fallen
+from mcmj.robots.steering import steering_bias
+from mcmj.robots.trunk_walker import has_fallen, new_robot, stand
+from mcmj.simulation.held_symbols import held_states
 from mcmj.simulation.reservoir import Reservoir
 from mcmj.utils.progress import OnSteps
 from mcmj.utils.seeds import stream
@@ -15,17 +18,20 @@ from mcmj.utils.validation import Array
 
 STRIDES = 8  # of a walk whose lengths are looked at
 VARIANCE = 0.999
+# capacities: symbols left out first, each held so long [s], over what turns the robot
+WASHOUT, HOLD, SIZE = 50, 0.1, 0.3
+MAX_DELAYS = (20, 10)
 
 
 def controls(config: Config, gaits: dict[str, LearnedGait], name: str, on_steps: OnSteps) -> Table:
-    """Of one gait: rank of the lengths; walks under shuffled and frozen ones; pushes of a tape."""
+    """Of one gait: rank and capacity; walks under shuffled and frozen lengths; pushes of a tape."""
     gait, table = gaits[name], Table(rank=rank(gaits[name]))
     for what, readout in {"shuffled": shuffled(config, gait), "frozen": frozen(gait)}.items():
         robot = gait.robot()
         robot.set_readout(readout)
         table[what] = end_of(config, gait, robot, config.survive)
         on_steps(round(config.survive / robot.timestep))
-    return table | {"tape": _pushed(config, gait, on_steps)}
+    return table | {"tape": _pushed(config, gait, on_steps), "capacity": capacity(config, gait)}
 
 
 def shuffled(config: Config, gait: LearnedGait) -> Array:
@@ -57,6 +63,32 @@ def rank(gait: LearnedGait) -> Table:
         "participation": float(spread.sum() ** 2 / (spread**2).sum()),
         "springs": lengths.shape[1],
     }
+
+
+def capacity(config: Config, gait: LearnedGait) -> Table:
+    """What the lengths know of symbols that disturb the muscles, standing and walking.
+
+    Each symbol is added for HOLD to the commands, times SIZE of the bias that turns the robot.
+    """
+    assert gait.learned is not None
+    robot = new_robot(gait.trunk, bias=SIZE * steering_bias(gait.trunk, "turn"))
+    robot.set_readout(gait.learned.w_out)
+    symbols = stream(config.seed, "probe_inputs").uniform(-1.0, 1.0, (WASHOUT + config.symbols, 1))
+    table: Table = {}
+    for what, gate in (("standing", 0.0), ("walking", 1.0)):
+        stand(robot)
+        if gate:
+            walking = gait.robot()
+            robot.set_state(walking.qpos, walking.qvel)
+        hold = round(HOLD / robot.timestep)
+        states = or_lost(lambda: held_states(robot, symbols, hold, gate=gate), None)  # noqa: B023
+        if states is None:
+            table[what] = None
+            continue
+        found = processing_capacity(states[WASHOUT:], symbols[WASHOUT:, 0], MAX_DELAYS)
+        linear = found.of_degree(1) - found.of(((0, 1),))
+        table[what] = {"rank": found.rank, "memory_capacity": linear, "ipc_total": found.total}
+    return table
 
 
 def _pushed(config: Config, gait: LearnedGait, on_steps: OnSteps) -> Table:

@@ -9,6 +9,7 @@ import numpy as np
 from mcmj.experiments.blow_ups import or_lost
 from mcmj.experiments.soft_robot.config import Config
 from mcmj.experiments.soft_robot.controls import controls
+from mcmj.experiments.soft_robot.economy import economy
 from mcmj.experiments.soft_robot.result import measures
 from mcmj.experiments.trunk import parts as trunk_parts
 from mcmj.experiments.trunk.result import LearnedGait, Table, fell
@@ -136,4 +137,5 @@ RUNS: dict[str, Callable[[Config, Gaits, str, OnSteps], object]] = {
     "controls": controls,
     "ground": ground,
     "cut": cut,
+    "economy": economy,
 }
