@@ -4,7 +4,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.signal import lfilter
 
 from mcmj.simulation.reservoir import Reservoir
 from mcmj.utils.errors import InvalidArgumentError
@@ -164,6 +163,8 @@ class TeacherNoise:
         drawn = self._generator.standard_normal((steps, 1 + bool(self._drift), self._channels))
         found: Array = self._noise * drawn[:, 0]
         if self._drift:
+            from scipy.signal import lfilter  # takes a second to import
+
             size = self._drift * np.sqrt(1.0 - self._decay**2)
             slow, self._last = lfilter(
                 [size], [1.0, -self._decay], drawn[:, 1], axis=0, zi=self._last

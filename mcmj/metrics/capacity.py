@@ -16,8 +16,7 @@ from itertools import combinations_with_replacement, groupby, islice
 
 import numpy as np
 from scipy.linalg import svd
-from scipy.special import eval_legendre
-from scipy.stats import chi2
+from scipy.special import chdtri, eval_legendre
 
 from mcmj.utils.errors import InvalidArgumentError
 from mcmj.utils.validation import Array, as_array, require_count, require_number
@@ -125,7 +124,7 @@ def processing_capacity(
         targets -= targets.mean(axis=0)
         values.append(((basis.T @ targets) ** 2).sum(axis=0) / (targets**2).sum(axis=0))
     rank = basis.shape[1]
-    threshold = float(chi2.isf(p_value, rank) / rows)
+    threshold = float(chdtri(rank, p_value) / rows)  # of chi-square
     found = np.concatenate(values)
     return Capacities(terms, np.where(found > threshold, found, 0.0), threshold, rank)
 

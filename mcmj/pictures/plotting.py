@@ -14,15 +14,11 @@ from matplotlib.ticker import MaxNLocator
 
 from mcmj.core.body import Body
 from mcmj.metrics.orbits import ORBIT_POINTS
-from mcmj.mjcf.appearance import node_colour
+from mcmj.mjcf.appearance import node_colour, node_kinds
 from mcmj.targets.limit_cycles import Target
 from mcmj.utils.colours import (
     BLACK,
     BLUE,
-    FEEDBACK_COLOURS,
-    FIXED_COLOUR,
-    INPUT_COLOUR,
-    PLAIN_COLOUR,
     TARGET_COLOUR,
 )
 from mcmj.utils.files import whole_file
@@ -74,17 +70,13 @@ def draw_network(axes: Axes, body: Body) -> None:
     for node, (x, y) in enumerate(flat):
         marker = "s" if body.fixed[node] else "o"
         axes.plot(x, y, marker, color=node_colour(body, node), ms=7, mec="black", mew=0.5)
-    roles = [("fixed", FIXED_COLOUR, "s"), ("input", INPUT_COLOUR, "o")][
-        : 2 if body.n_inputs else 1
-    ]
-    roles += [
-        (f"fed $x_{c + 1}$", FEEDBACK_COLOURS[c % len(FEEDBACK_COLOURS)], "o")
-        for c in range(body.n_outputs)
-    ]
     handles = [
-        Line2D([], [], ls="", marker=marker, color=colour, mec="black", mew=0.5, label=label)
-        for label, colour, marker in [*roles, ("other", PLAIN_COLOUR, "o")]
-    ]
+        Line2D(
+            [], [], ls="", marker="s" if name == "fixed" else "o", color=colour, mec="black",
+            mew=0.5, label=name,
+        )
+        for name, colour in node_kinds(body).items()
+    ]  # fmt: skip
     axes.legend(
         handles=handles, loc="upper center", bbox_to_anchor=(0.5, -0.14), ncols=3, frameon=False
     )

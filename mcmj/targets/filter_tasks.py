@@ -7,7 +7,6 @@ shown for a while each (`hold`), because a body has a time scale of its own.
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.signal import lfilter
 
 from mcmj.utils.errors import DivergenceError, InvalidArgumentError
 from mcmj.utils.validation import Array, require_count, require_number
@@ -135,6 +134,8 @@ def switch(
 
 def low_pass(values: Array, timestep: float, time: float) -> Array:
     """z' = (values - z) / time, from 0, for values (T, n)."""
+    from scipy.signal import lfilter  # takes a second to import
+
     keep = np.exp(-timestep / time)
     found: Array = lfilter([1 - keep], [1, -keep], values, axis=0)
     return found

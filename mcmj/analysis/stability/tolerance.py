@@ -5,7 +5,6 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-from scipy.stats import binom
 
 from mcmj.analysis.loops.loop_map import LoopMap
 from mcmj.analysis.stability.basin import pushed, survey
@@ -59,6 +58,8 @@ class Tolerance:
         Between order statistics: the number of copies below the true median is binomial (Conover,
         Practical Nonparametric Statistics, section 3.2).
         """
+        from scipy.stats import binom  # takes a second to import
+
         count = len(self.values)
         rank = int(binom.ppf(0.025, count, 0.5))
         if rank == 0:

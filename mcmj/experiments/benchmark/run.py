@@ -18,6 +18,7 @@ from mcmj.experiments.benchmark.full_scene import full_scene
 from mcmj.experiments.benchmark.lean import lean_costs
 from mcmj.experiments.benchmark.models import model_costs
 from mcmj.experiments.benchmark.process import machine, memory, start_up
+from mcmj.experiments.benchmark.robots import robot_costs
 from mcmj.experiments.benchmark.trials import trial_costs
 from mcmj.reference.twin.population import Population
 from mcmj.simulation.corrected_run import Stretch, run_corrected
@@ -206,6 +207,7 @@ PARTS = (
     loop_costs,
     lean_costs,
     model_costs,
+    robot_costs,
     learning_costs,
     twin_costs,
     trial_costs,

@@ -79,7 +79,8 @@ def smallest_figure(result: Result) -> Figure:
         _draw_sizes(axes, sizes)
         axes.set_title(_task_title(task))
     panels[0].set(ylabel="share of the bodies that learn it", ylim=(-0.03, 1.03))
-    panels[0].legend(frameon=False, loc="upper left")
+    handles, labels = panels[0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside upper center", ncols=len(KINDS), frameon=False)
     return figure
 
 

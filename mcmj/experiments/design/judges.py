@@ -25,7 +25,7 @@ INPUT_DRIVEN = "input_driven"
 NODES = {"van_der_pol": 10, "quadratic": 10, "lissajous": 15, INPUT_DRIVEN: 40}
 USUAL_NODES = 25
 QUICK = Teaching(duration=60.0, washout=15.0, every=5)  # at most, where candidates are screened
-QUICK_RUN, EXACT_RUN = 60.0, 45.0  # s
+QUICK_RUN, EXACT_RUN = 60.0, 90.0  # s
 WINDOW = 20.0  # s: the errors are those of this last part of a free run
 EXACT_RTOL = 1e-7  # of DOP853: far below the orbit errors, and much cheaper than 1e-12
 SPARSE = 5  # of the outputs, every n-th: the orbit is a polygon through them
