@@ -84,8 +84,8 @@ def test_each_command_installs_what_it_needs_once(place):
     for command, added in steps:
         done = run(place, command, "--flag")
         assert done.returncode == 0, done.stderr
-        wanted = "pytest --flag" if command == "test" else f"mcmj {command} --flag"
-        assert done.stdout == f"ran -m {wanted}\n"
+        wanted = "pytest -n logical --maxprocesses 4" if command == "test" else f"mcmj {command}"
+        assert done.stdout == f"ran -m {wanted} --flag\n"
         expected += [added] if added else []
         assert installed(place) == expected
 

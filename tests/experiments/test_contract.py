@@ -57,7 +57,8 @@ TINY = {
     f"--engine twin {ON_CYCLE} {UNPRACTISED}",
     "swing_up": f"{TAUGHT} {UNPRACTISED} --free-run 15 --window 12 --kicks 1",
     "soft_robot": (
-        "--gaits trot --parts energy --walking 3 --judged 1 --rounds 1 --round-duration 3 --trial 1"
+        "--seed 100 --gaits trot --parts energy --walking 3 --judged 1 --rounds 1 "
+        "--round-duration 3 --trial 1"
     ),
     "trunk": "--gaits trot --parts --walking 3 --judged 1 --rounds 1 --round-duration 4 --trial 2",
     "walk": "--parts walk --gaits trot --settle 2 --walking 3 --before 2 --after 2",
