@@ -17,7 +17,10 @@ from mcmj.experiments.registry import entries
 from mcmj.mjcf.bundled import body_names
 print(mcmj.__file__, *body_names(), *entries())
 """
-SHORT = "--task quadratic --free-run 13 --window 12 --duration 8 --washout 2 --rounds 0 --no-video"
+SHORT = (
+    "--task quadratic --free-run 13 --window 12 --duration 8 --washout 2 --rounds 0 "
+    "--trial 13 --trial-window 12 --no-video"
+)
 pytestmark = pytest.mark.slow
 
 

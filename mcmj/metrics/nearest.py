@@ -25,7 +25,7 @@ def distances_to_curve(points: Array, curve: Array, *, closed: bool) -> Array:
     return found
 
 
-def rows_within(points: Array, curve: Array, distance: float, window: int = 1) -> int:
+def rows_within(points: Array, curve: Array, distance: float, window: int) -> int:
     """How many of the last points (P, n) in a row are within a distance of a closed polygon.
 
     Args:

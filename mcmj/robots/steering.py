@@ -24,7 +24,7 @@ from mcmj.utils.seeds import stream
 from mcmj.utils.validation import Array, require_names
 
 # at u = 1 [m]: feet fore and hind apart, all to the right, left and right up and down; all ahead
-TURN, BRAKE = (0.03, 0.015, 0.012), 0.14
+TURN, BRAKE = (0.0375, 0.018, 0.015), 0.14
 LOWEST = {"turn": -1.0, "brake": 0.0}  # of u, by what it does; the largest is 1
 RAMP = 0.5  # s, from one value of u to the next, and in which a teacher begins
 TELL = 0.1  # s, between an operator's commands
@@ -165,23 +165,24 @@ class PointFollower:
     Args:
         points: (n, 2) places to go through, one after the other [m].
         gain: u per radian.
-        near: a point is reached within this distance [m].
+        near: a point is reached within this distance [m], or left behind.
         straight: u at which the robot walks straight ahead.
     """
 
     def __init__(self, points: Array, gain: float, near: float, straight: float = 0.0) -> None:
         self.points, self.gain, self.near, self.straight = points, gain, near, straight
-        self.reached = 0
+        self.reached, self._along = 0, np.gradient(points, axis=0)
 
     @property
     def done(self) -> bool:
-        """Whether all points are reached."""
+        """Whether all points are reached, or left behind."""
         return self.reached == len(self.points)
 
     def __call__(self, pose: Array) -> float:
         """The next input."""
-        apart = self.points[min(self.reached, len(self.points) - 1)] - pose[:2]
-        if np.hypot(*apart) < self.near and not self.done:
+        k = min(self.reached, len(self.points) - 1)
+        apart = self.points[k] - pose[:2]
+        if not self.done and (np.hypot(*apart) < self.near or apart @ self._along[k] < 0.0):
             self.reached += 1
         turn = np.arctan2(apart[1], apart[0]) - headings(pose[None])[0]
         return self.straight + self.gain * float(np.mod(turn + np.pi, 2 * np.pi) - np.pi)

@@ -34,7 +34,8 @@ TINY = {
     "--free-run 8 --before 5 --after 10 --from-rest 8 --window 8 --rounds 0 --phases 2",
     "guided": "--experiment limit_cycle --vary teaching.noise=log(0.05,0.5) --set task=quadratic "
     "settings.nodes=12 teaching.duration=12.0 teaching.washout=4.0 teaching.rest_runs=0 "
-    "teaching.held_runs=0 practice.rounds=0 free_run=14.0 window=12.0 "
+    "teaching.held_runs=0 practice.rounds=0 practice.trial=13.0 practice.trial_window=12.0 "
+    "free_run=14.0 window=12.0 "
     "--settings 3 --bodies 1 --judged 1 --confirm 0 --workers 1",
     "hard_cases": "--cases ordinary --integrators Euler --duration 0.05 --most-steps 200",
     "input_driven": "--engine twin --seed 1 --nodes 15 --free-run 14 --window 13 --sweep 0 "
@@ -49,6 +50,7 @@ TINY = {
     "render": "--duration 0.3 --formats png --stills 1",
     "search": "--seeds 2 --set task=quadratic settings.nodes=12 teaching.duration=12.0 "
     "teaching.washout=4.0 teaching.rest_runs=0 teaching.held_runs=0 practice.rounds=0 "
+    "practice.trial=13.0 practice.trial_window=12.0 "
     "free_run=14.0 window=12.0 --confirm 1 --audit 1 --cost-trials 2 "
     "--workers 1",
     "speed_accuracy": "--bodies toolbox_n10 --methods mujoco_Euler mujoco_RK4 --steps-ms 1 2 "

@@ -79,6 +79,7 @@ def test_a_body_taught_by_ones_own_target_is_found_taught(place, tmp_path, capsy
     task = ["--task", str(place / "mine.csv"), "--no-video", "--quiet"]
     short = ["--duration", "8", "--washout", "2", "--free-run", "13", "--window", "12"]
     short += ["--no-measure-cost", "--rest-runs", "0", "--held-runs", "0", "--rounds", "0"]
+    short += ["--trial", "13", "--trial-window", "12"]
     main(["limit_cycle", *task, *short, "--nodes", "12", "--out", str(tmp_path / "one")])
     body = str(tmp_path / "one" / "body.xml")
     assert list(open_body(body).readouts) == ["mine"]

@@ -17,6 +17,7 @@ from mcmj.mjcf.read import load_model, readouts_of_model
 
 SHORT = ["--duration", "8", "--washout", "2", "--free-run", "13", "--window", "12", "--no-video"]
 ON_CYCLE = ["--rest-runs", "0", "--held-runs", "0", "--rounds", "0"]
+ON_CYCLE += ["--trial", "13", "--trial-window", "12"]
 SHORT += ON_CYCLE
 
 

@@ -70,11 +70,11 @@ def test_rows_within_a_distance_are_counted_from_the_end(seed):
     curve = goal.orbit(500)
     outside = np.flatnonzero(brute_force(points, curve, closed=True) > 0.1)
     wanted = len(points) - 1 - outside[-1] if outside.size else len(points)
-    assert rows_within(points, curve, 0.1) == wanted
+    assert rows_within(points, curve, 0.1, 1) == wanted
 
 
 def test_rows_that_are_all_within_and_none():
     goal = from_array("circle", np.array([[1.0, 0], [0, 1], [-1, 0], [0, -1]]), 1.0)
     curve = goal.orbit(100)
-    assert rows_within(curve, curve, 1e-12) == 100
-    assert rows_within(curve + 5, curve, 1.0) == 0
+    assert rows_within(curve, curve, 1e-12, 1) == 100
+    assert rows_within(curve + 5, curve, 1.0, 1) == 0

@@ -278,6 +278,18 @@ def test_an_operator_leads_a_point_that_turns_as_told_through_its_points():
     assert nearest.max() < 0.3
 
 
+def test_a_point_that_cannot_be_reached_is_left_behind():
+    """Straight ahead, whatever is said: points aside are passed, no circle is begun."""
+    operator = PointFollower(np.array([[1.0, 0.0], [2.0, 1.5], [3.0, 0.0]]), gain=2.0, near=0.3)
+    reached = []
+    for x in np.arange(0.0, 3.5, 0.05):
+        operator(np.array([x, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0]))
+        reached.append(operator.reached)
+    assert operator.done
+    assert reached[int(1.5 / 0.05)] == 1
+    assert reached[int(2.5 / 0.05)] == 2
+
+
 def test_carried_back_to_the_start_a_robot_goes_on_as_it_would(trunk):
     """Nothing in the world but gravity and a level ground knows of places and directions."""
     robot, angle = new_robot(trunk), 2.0

@@ -77,7 +77,7 @@ class Config(trunk.Config):
     steered: str = "bound"
     hold: float = 2.0
     told: tuple[float, ...] = (-1.0, -0.8, -0.4, 0.0, 0.4, 0.8, 1.0)
-    points: tuple[float, float] = (12.0, 1.0)
+    points: tuple[float, float] = (16.0, 1.0)
     gain: float = 2.0
     trunk: TrunkSettings = SPATIAL
     learning: ForceLearning = field(

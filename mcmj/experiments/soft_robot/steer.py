@@ -29,7 +29,7 @@ from mcmj.utils.validation import Array
 
 TRIED = 3  # inputs of a trial while learning
 SETTLE = 2.0  # s after a change of the input that is not measured
-LONGEST = 240.0  # s, on a path
+LONGEST = 300.0  # s, on a path
 
 
 @dataclass(frozen=True)

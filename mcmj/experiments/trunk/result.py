@@ -86,9 +86,8 @@ def walk_table(config: Config, gait: LearnedGait) -> Table:
 
 
 def forward_speed(walk: Walk) -> float:
-    """Way forwards over time [m/s], negative backwards."""
-    way = walk.trunk[0, -1, 0] - walk.trunk[0, 0, 0]
-    return float(way / (walk.times[-1] - walk.times[0]))
+    """Way along the heading over time [m/s], negative backwards."""
+    return float(walk_metrics.way_ahead(walk)[0] / (walk.times[-1] - walk.times[0]))
 
 
 def fell(gait: LearnedGait, walk: Walk) -> bool:
