@@ -16,7 +16,7 @@ import numpy as np
 from mcmj.metrics import orbits
 from mcmj.robots.trunk import Trunk, changes_of_length, muscle_target
 from mcmj.robots.trunk_walker import SAMPLE, has_fallen, new_robot, poses, stand, walk
-from mcmj.robots.walk_metrics import Walk, headings, joined
+from mcmj.robots.walk_metrics import Walk, fallen, headings, joined
 from mcmj.simulation.reservoir import Reservoir
 from mcmj.targets.limit_cycles import Target
 from mcmj.utils.errors import DivergenceError
@@ -54,16 +54,17 @@ def steering_bias(trunk: Trunk, steer: str) -> Array:
 def course_of_inputs(steer: str, seed: int, hold: float) -> Callable[[Array], Array]:
     """Random u (T, 1) at times (T,) [s], each held for so long [s], to learn from.
 
-    Every third is at an end, where else hardly any is.
+    Every third is at an end, where else hardly any is; they follow each other in RAMP seconds.
     """
     low = LOWEST[steer]
     values = stream(seed, "task_inputs").uniform(low, 1.0, 4096)
     values[::3] = np.where(values[::3] < (low + 1.0) / 2, low, 1.0)
+    values = np.concatenate([[0.0], values])  # a robot begins as it stands
 
     def course(times: Array) -> Array:
-        which = (times / hold).astype(int) % len(values)
+        which = (times / hold).astype(int) % (len(values) - 1)
         share = np.minimum(1.0, np.mod(times, hold) / RAMP)
-        found: Array = values[which - 1] + share * (values[which] - values[which - 1])
+        found: Array = values[which] + share * (values[which + 1] - values[which])
         return found[:, None]
 
     return course
@@ -78,12 +79,12 @@ def straight_curvature(trunk: Trunk, gait: str, pace: float) -> float:
     robot, tried = new_robot(trunk), dict[float, float]()
     stand(robot)
     start, told = robot.snapshot(), 0.0
-    while len(tried) < WALKS and abs(told) <= STEEPEST:
+    while len(tried) < WALKS and told not in tried:
         robot.restore(start)
         tried[told] = _turning(robot, trunk, muscle_target(trunk, gait, pace, curvature=told))
         if abs(tried[told]) < STRAIGHT:
             break
-        told = next_curvature(tried)
+        told = float(np.clip(next_curvature(tried), -STEEPEST, STEEPEST))
     return min(tried, key=lambda told: abs(tried[told]))
 
 
@@ -106,7 +107,7 @@ def next_curvature(tried: dict[float, float]) -> float:
 
 
 def _turning(robot: Reservoir, trunk: Trunk, target: Target) -> float:
-    """Of a robot under a teacher, to the left [deg/s], when it has settled; inf if it blows up."""
+    """Of a robot under a teacher, to the left [deg/s], when it has settled; inf if it falls."""
     step, every = robot.timestep, round(SAMPLE / robot.timestep)
     times = step * np.arange(round(WALK / step))
     told = np.minimum(1.0, times / RAMP)[:, None] * target.sample(times)
@@ -114,7 +115,10 @@ def _turning(robot: Reservoir, trunk: Trunk, target: Target) -> float:
         run = robot.rollout(offset=told, gate=0.0, record=("qpos",)).thinned(every)
     except DivergenceError:
         return np.inf
-    heading = headings(poses(trunk, run.get("qpos")))[len(run) // 2 :]
+    pose = poses(trunk, run.get("qpos"))
+    if fallen(pose, trunk.settings.leg).any():
+        return np.inf
+    heading = headings(pose)[len(run) // 2 :]
     return float(np.degrees(heading[-1] - heading[0])) / (SAMPLE * (len(heading) - 1))
 
 
@@ -141,7 +145,7 @@ def operate(
     operator: Callable[[Array], float],
     done: Callable[[], bool],
 ) -> tuple[Walk, Array]:
-    """A walk whose input an operator sets, and the inputs (n,), one in TELL seconds.
+    """A walk whose input an operator sets, until it falls; and the inputs (n,), one in TELL s.
 
     Args:
         duration: at most [s].
@@ -153,7 +157,10 @@ def operate(
     """
     parts, told = list[Walk](), list[float]()
     while len(told) * TELL < duration and not done():
-        u = operator(poses(trunk, robot.qpos))
+        pose = poses(trunk, robot.qpos)
+        if fallen(pose, trunk.settings.leg):
+            break
+        u = operator(pose)
         told.append(float(np.clip(u, -1.0, 1.0)))
         parts.append(walk(robot, trunk, TELL, told=told[-1]))
     return joined(parts), np.array(told)
@@ -165,24 +172,35 @@ class PointFollower:
     Args:
         points: (n, 2) places to go through, one after the other [m].
         gain: u per radian.
-        near: a point is reached within this distance [m], or left behind.
+        near: a point is reached within this distance [m], or left behind; the last one must be
+            left behind.
         straight: u at which the robot walks straight ahead.
+
+    Attributes:
+        calls: number of commands before each point that was reached or left behind.
     """
 
     def __init__(self, points: Array, gain: float, near: float, straight: float = 0.0) -> None:
         self.points, self.gain, self.near, self.straight = points, gain, near, straight
-        self.reached, self._along = 0, np.gradient(points, axis=0)
+        self.calls: list[int] = []
+        self._called, self._along = 0, np.gradient(points, axis=0)
 
     @property
     def done(self) -> bool:
         """Whether all points are reached, or left behind."""
-        return self.reached == len(self.points)
+        return len(self.calls) == len(self.points)
 
     def __call__(self, pose: Array) -> float:
         """The next input."""
-        k = min(self.reached, len(self.points) - 1)
-        apart = self.points[k] - pose[:2]
-        if not self.done and (np.hypot(*apart) < self.near or apart @ self._along[k] < 0.0):
-            self.reached += 1
+        while not self.done and self._passed(pose[:2]):
+            self.calls.append(self._called)
+        self._called += 1
+        apart = self.points[min(len(self.calls), len(self.points) - 1)] - pose[:2]
         turn = np.arctan2(apart[1], apart[0]) - headings(pose[None])[0]
         return self.straight + self.gain * float(np.mod(turn + np.pi, 2 * np.pi) - np.pi)
+
+    def _passed(self, place: Array) -> bool:
+        k = len(self.calls)
+        apart = self.points[k] - place
+        reached = np.hypot(*apart) < self.near and k < len(self.points) - 1
+        return bool(reached or apart @ self._along[k] < 0.0)

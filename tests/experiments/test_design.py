@@ -7,6 +7,7 @@ import pytest
 
 import mcmj
 from mcmj.analysis.promise import linear_measures
+from mcmj.core.random_body import draw_body
 from mcmj.experiments.design import one_body, trade_off
 from mcmj.experiments.design.config import Config
 from mcmj.experiments.design.judges import InputDriven, Tried
@@ -19,6 +20,7 @@ from mcmj.mjcf.bundled import open_body
 from mcmj.reference.integration import integrate_smooth
 from mcmj.search.body_space import BodySpace
 from mcmj.utils.errors import InvalidArgumentError, UnknownNameError
+from mcmj.utils.seeds import stream
 
 GOAL = mcmj.target("van_der_pol")
 SHORT = Teaching(duration=20.0, washout=5.0)
@@ -46,7 +48,6 @@ def test_a_search_at_random_may_try_as_many_bodies_and_begins_with_the_same():
     assert not result.found.passed
     assert result.found.scores[0] == result.hunt.scores[0]
     assert result.found.scores[1] != result.hunt.scores[1]
-    assert min(result.hunt.scores) <= result.hunt.scores[0]
 
 
 def test_a_body_that_learns_as_it_is_drawn_is_left_alone():
@@ -84,10 +85,10 @@ def test_measures_before_teaching_meet_what_was_learned(tmp_path):
     bodies = [mcmj.random_body(seed, nodes=6) for seed in range(12)]
     good = np.array([learned(body, seed) for seed, body in enumerate(bodies)])
     assert found["successes"] == good.sum()
-    if 0 < good.sum() < 12:
-        gains = np.array([linear_measures(body, GOAL.period)["gain"] for body in bodies])
-        order = np.mean([a > b for a in gains[good] for b in gains[~good]])
-        assert found["auc"]["gain"] == pytest.approx(order)
+    assert 0 < good.sum() < 12
+    gains = np.array([linear_measures(body, GOAL.period)["gain"] for body in bodies])
+    order = np.mean([a > b for a in gains[good] for b in gains[~good]])
+    assert found["auc"]["gain"] == pytest.approx(order)
 
 
 def learned(body, seed):
@@ -129,9 +130,9 @@ def test_a_front_is_what_nothing_beats_in_both():
 def test_a_trade_off_tries_as_many_at_random_and_noise_costs():
     config = trade_off.Config(nodes=4, tries=3, free_run=26.0, teaching=SHORT)
     result = trade_off.run(config)
-    assert len(result.designed) == len(result.random)
     assert len(result.designed) >= 1 + 3 * len(trade_off.WEIGHTS)
-    assert (result.designed[0] == result.random[0]).all()
+    body = draw_body(int(stream(0, "random_search").integers(2**31)), config.judge.settings(4))
+    assert (result.random[1] == config.judge.noisy(body, 0, config.sensor_noise).errors).all()
     assert len(front := trade_off.front(result.designed))
     assert (front.min(axis=0) == result.designed.min(axis=0)).all()
     judge, body = LEARNS.judge, mcmj.random_body(21, nodes=10)
@@ -150,6 +151,8 @@ def test_bad_configs():
         Config(parts=("head",))
     with pytest.raises(InvalidArgumentError, match="nodes"):
         Config(parts=("smallest",), sizes=(2,))
+    with pytest.raises(InvalidArgumentError, match="sizes: expected at least one, each once"):
+        Config(parts=("smallest",), sizes=())
 
 
 @pytest.mark.parametrize(("nodes", "most"), [(3, 0.05), (10, 0.01)])

@@ -1,5 +1,7 @@
 """A soft robot in space: its mechanics against symmetry, conservation and geometry."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.optimize import least_squares
@@ -8,9 +10,11 @@ from scipy.spatial.transform import Rotation
 from mcmj.core.body import Body
 from mcmj.experiments.soft_robot.config import SPATIAL, Config
 from mcmj.experiments.soft_robot.economy import VARIED, designed
+from mcmj.experiments.soft_robot.steer import distances_in_order, figure_of_eight
 from mcmj.robots.energy import energy_balance
 from mcmj.robots.quadruped import GRAVITY
 from mcmj.robots.steering import (
+    TELL,
     PointFollower,
     course_of_inputs,
     next_curvature,
@@ -19,8 +23,9 @@ from mcmj.robots.steering import (
 )
 from mcmj.robots.trunk import Trunk, draw_trunk, muscle_lengths, muscle_target
 from mcmj.robots.trunk_walker import heading_ahead, new_robot, poses, stand, walk
-from mcmj.robots.walk_metrics import headings
+from mcmj.robots.walk_metrics import Walk, headings
 from mcmj.targets.gaits import LEGS
+from mcmj.utils.errors import InvalidArgumentError
 
 MIRROR = np.array([1.0, -1.0, 1.0])
 OTHER_SIDE = [1, 0, 3, 2]  # legs
@@ -62,7 +67,7 @@ def led(trunk, gait, seconds=0.6):
 
 
 def test_a_mirrored_robot_does_the_mirrored_thing(trunk):
-    """In a pace, the mirrored robot's other legs begin: half a stride later."""
+    """In a bound, where left and right legs do the same."""
     one, other = trunk, mirrored(trunk)
     swap = np.r_[np.arange(trunk.settings.nodes), trunk.settings.nodes + np.array(OTHER_SIDE)]
     first, second = led(one, "bound"), led(other, "bound")[:, swap] * MIRROR
@@ -201,6 +206,7 @@ def test_a_course_of_inputs_has_all_values_and_does_not_jump():
         assert course.min() == low
         assert course.max() == 1.0
         assert np.abs(np.diff(course)).max() < 1.01e-3 * (1.0 - low) / 0.5
+        assert course[0] == 0.0
         counts = np.histogram(course, 10)[0]
         assert counts.min() > len(times) / 30
 
@@ -233,6 +239,41 @@ def test_curvatures_close_in_on_where_the_turning_changes_sign(rate):
     assert rate(best - 0.01) < 0.0 < rate(best + 0.01) or rate(best + 0.01) < 0.0 < rate(
         best - 0.01
     )
+
+
+def test_distances_from_points_are_taken_in_their_order():
+    """A walk along two circles, a little wide: the crossing is its start, a point, and its end."""
+    points, angle = figure_of_eight(4.0), np.linspace(0.0, 2 * np.pi, 401)
+    left = np.column_stack([4.2 * np.sin(angle), 4.2 * (1 - np.cos(angle))])
+    way = np.vstack([left, left[1:] * [1.0, -1.0], [[0.3, 0.0]]])
+    operator = PointFollower(points, gain=1.0, near=0.1)
+    trunk = np.zeros((1, len(way), 7))
+    trunk[0, :, :2], trunk[0, :, 3] = way, 1.0
+    for pose in trunk[0]:
+        operator(pose)
+    assert operator.done
+    nothing = np.zeros((1, len(way), 1))
+    walked = Walk(TELL * np.arange(len(way)), trunk, nothing, nothing, nothing[0], nothing[0])
+    apart = distances_in_order(walked, operator)
+    wanted = [np.linalg.norm(way - point, axis=1).min() for point in points]
+    assert apart == pytest.approx(wanted, abs=1e-12)
+    assert apart.max() == pytest.approx(0.4, abs=0.01)
+    short = replace(walked, times=walked.times[:100], trunk=trunk[:, :100])
+    operator.calls = operator.calls[:1]
+    assert np.isfinite(distances_in_order(short, operator)).tolist() == [True] + 15 * [False]
+
+
+@pytest.mark.parametrize(
+    ("changes", "text"),
+    [
+        ({"hold": 0.2}, "hold: expected a number in"),
+        ({"told": (-1.0, 1.0)}, "told: expected values in order, 0 among them"),
+        ({"told": (0.0, -1.0)}, "told: expected values in order, 0 among them"),
+    ],
+)
+def test_inputs_that_cannot_be_measured_are_refused(changes, text):
+    with pytest.raises(InvalidArgumentError, match=text):
+        Config(**changes)
 
 
 @pytest.mark.slow
@@ -284,7 +325,7 @@ def test_a_point_that_cannot_be_reached_is_left_behind():
     reached = []
     for x in np.arange(0.0, 3.5, 0.05):
         operator(np.array([x, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0]))
-        reached.append(operator.reached)
+        reached.append(len(operator.calls))
     assert operator.done
     assert reached[int(1.5 / 0.05)] == 1
     assert reached[int(2.5 / 0.05)] == 2
@@ -304,11 +345,11 @@ def test_carried_back_to_the_start_a_robot_goes_on_as_it_would(trunk):
         (qvel.reshape(-1, 3) @ turn.T).ravel(),
     )
     back, rate = heading_ahead(trunk, robot)
-    assert np.abs(np.diff((back - qpos).reshape(-1, 3), axis=0)).max() < 1e-12
+    assert np.abs(back - qpos).max() < 1e-12
     assert np.abs(rate - qvel).max() < 1e-12
     ends = []
     for start in ((qpos, qvel), (robot.qpos, robot.qvel)):
         robot.set_state(*start)
         robot.rollout(offset=told[1000:1100], gate=0.0, record=())
-        ends.append(poses(trunk, robot.qpos)[2])
-    assert ends[0] == pytest.approx(ends[1], abs=1e-9)
+        ends.append(heading_ahead(trunk, robot)[0])
+    assert np.abs(ends[0] - ends[1]).max() < 1e-9

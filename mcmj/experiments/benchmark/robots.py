@@ -7,10 +7,10 @@ import numpy as np
 from mcmj.experiments.benchmark.config import Config
 from mcmj.experiments.soft_robot.config import SPATIAL
 from mcmj.robots.trunk import TrunkSettings, draw_trunk
-from mcmj.robots.trunk_walker import new_robot, stand
+from mcmj.robots.trunk_walker import STEPS, new_robot, stand
 from mcmj.utils.timing import Work, interleaved_seconds, median_ratio
 
-INTEGRATORS = {"Euler": 4e-4, "discrete": 1e-3, "implicitfast": 1e-3}  # time steps [s]
+INTEGRATORS = dict([STEPS[3]], discrete=1e-3, implicitfast=1e-3)  # time steps [s]
 
 
 def robot_costs(config: Config, body: object) -> dict[str, object]:

@@ -8,7 +8,8 @@ import tyro
 
 from mcmj.experiments.design import measured, one_body, trade_off
 from mcmj.search.experiment import Trial
-from mcmj.search.space import MAX_SEED, MAX_TRIALS
+from mcmj.search.space import MAX_TRIALS
+from mcmj.utils.errors import InvalidArgumentError
 from mcmj.utils.validation import require_count, require_names
 
 PARTS = ("bodies", "smallest", "predictors", "pareto")
@@ -65,7 +66,11 @@ class Config(one_body.Config):
     def __post_init__(self) -> None:
         super().__post_init__()
         require_count("seeds", self.seeds, 1)
-        require_count("seed", self.seed, 0, MAX_SEED - self.seeds)
+        require_count("seed", self.seed, 0, one_body.CHECKED_FROM - self.seeds)  # of noise, too
+        for name in ("tasks", "sizes"):
+            values = getattr(self, name)
+            if not values or len(set(values)) < len(values):
+                raise InvalidArgumentError(name, "at least one, each once", values)
         require_names("part", self.parts, PARTS)
         if self.workers is not None:
             require_count("workers", self.workers, 1)

@@ -114,6 +114,15 @@ class Hunt:
         """A body passed, or there were as many as may be."""
         return self.passed or self.tried >= self._config.evaluations
 
+    def attempt_at(self, space: BodySpace, x: Array) -> float:
+        """Try the body at x, if there is such a body; its score."""
+        try:
+            body = space.body(x)
+        except InvalidArgumentError:
+            self.tried += 1
+            return np.inf
+        return self.attempt(body, x)
+
     def attempt(self, body: Body, x: Array | None = None) -> float:
         """Try a body, which is at x; its score."""
         self.tried += 1
@@ -146,10 +155,7 @@ def evolve(config: Config) -> Hunt:
     while not hunt.over:
         candidates, scores = evolution.ask(), []
         for x in candidates:
-            try:
-                scores.append(hunt.attempt(space.body(x), x))
-            except InvalidArgumentError:  # no such body
-                scores.append(np.inf)
+            scores.append(hunt.attempt_at(space, x))
             if hunt.over:
                 return hunt
         evolution.tell(candidates, scores)

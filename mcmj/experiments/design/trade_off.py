@@ -109,15 +109,17 @@ def _evolve(config: Config, drawn: Body, weight: float, number: int) -> list[Arr
     """Errors of all bodies tried on the way to the smallest weighted one."""
     space = BodySpace(drawn, config.varied)
     found: list[Array] = []
-    seed = config.seed + number  # other proposals for every weight
+    seed = config.seed * len(WEIGHTS) + number  # other proposals for every weight and body
     evolution = Evolution(space.size, seed, spread=config.spread, bound=BOUND)
     while len(found) < config.tries:
         candidates, scores = evolution.ask(), []
         for x in candidates:
             try:
-                errors = _errors(config, space.body(x))
-            except InvalidArgumentError:  # no such body
+                body = space.body(x)
+            except InvalidArgumentError:
                 errors = np.full(2, LOST)
+            else:
+                errors = _errors(config, body)
             found.append(errors)
             scores.append(float(np.log(errors) @ [1.0 - weight, weight]))
         evolution.tell(candidates, scores)

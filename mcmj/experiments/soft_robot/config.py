@@ -7,7 +7,7 @@ import numpy as np
 
 from mcmj.experiments.trunk import config as trunk
 from mcmj.learning.force_learning import ForceLearning
-from mcmj.robots.steering import LOWEST
+from mcmj.robots.steering import LOWEST, RAMP
 from mcmj.robots.trunk import TrunkSettings
 from mcmj.robots.trunk_walker import STEPS
 from mcmj.targets.gaits import GAITS
@@ -56,7 +56,7 @@ class Config(trunk.Config):
         steered: gait of the robots that an input steers ..
         hold: .. how long its values are held while they learn [s].
         told: values of the input at which they are measured.
-        points: radius of the figure of eight, and how near its points are to be passed [m].
+        eight: radius of the figure of eight, and how near its points are to be passed [m].
         gain: of the operator who follows it, input per radian.
         trunk: what robots are drawn from.
         learning: how they learn.
@@ -77,7 +77,7 @@ class Config(trunk.Config):
     steered: str = "bound"
     hold: float = 2.0
     told: tuple[float, ...] = (-1.0, -0.8, -0.4, 0.0, 0.4, 0.8, 1.0)
-    points: tuple[float, float] = (16.0, 1.0)
+    eight: tuple[float, float] = (16.0, 1.0)
     gain: float = 2.0
     trunk: TrunkSettings = SPATIAL
     learning: ForceLearning = field(
@@ -92,16 +92,18 @@ class Config(trunk.Config):
         require_count("designs", self.designs, 1)
         require_count("symbols", self.symbols, 400)
         require_number("cut", self.cut, 0.0, 0.5, open_low=True)
-        for name in ("gain", "hold"):
-            require_number(name, getattr(self, name), 0.0, open_low=True)
-        for value in self.points:
-            require_number("points", value, 0.0, open_low=True)
+        require_number("gain", self.gain, 0.0, open_low=True)
+        require_number("hold", self.hold, RAMP)
+        for value in self.eight:
+            require_number("eight", value, 0.0, open_low=True)
         for height in self.heights:
             require_number("heights", height, 0.0, self.trunk.leg / 2)
         for slope in self.slopes:
             require_number("slopes", slope, -0.5, 0.5)
         for value in self.told:
             require_number("told", value, -1.0, 1.0)
+        if 0.0 not in self.told or list(self.told) != sorted(set(self.told)):
+            raise InvalidArgumentError("told", "values in order, 0 among them", self.told)
         if not self.trunk.depth:
             raise InvalidArgumentError("depth", "above 0: in a plane there is mcmj trunk", 0.0)
 
@@ -119,7 +121,7 @@ def total_steps(config: Config) -> int:
         "switch": (len(config.gaits) - 1) * config.survive,
         "steps": len(config.steps_ms) * walking,
         "energy": config.judged,
-        "controls": 3 * config.survive + pushes * config.survive,
+        "controls": 3 * config.survive + 4 * config.pushes * config.survive,
         "ground": (len(config.slopes) + len(config.heights)) * config.judged,
         "cut": learning.total + 2 * walking,
         "economy": config.designs * (learning.warm_up + learning.round_duration + learning.trial),

@@ -62,7 +62,7 @@ def by_practice(config: Config, gaits: Gaits, name: str, on_steps: OnSteps) -> T
 
 
 def energy(config: Config, gaits: Gaits, name: str, on_steps: OnSteps) -> Table:
-    """The balance of some whole strides, a second."""
+    """The balance of some whole strides, over their duration: J in a second."""
     gait, robot = gaits[name], gaits[name].robot()
     period = gait.target.period
     steps = round(max(1, round(2.0 / period)) * period / robot.timestep)
@@ -97,16 +97,16 @@ def ground(config: Config, gaits: Gaits, name: str, on_steps: OnSteps) -> Table:
 
 
 def cut(config: Config, gaits: Gaits, name: str, on_steps: OnSteps) -> Table:
-    """A share of the springs is cut: as it was taught, and after learning again."""
+    """A share of the springs is cut while it walks: as it was taught, and after learning again."""
     gait = gaits[name]
     count = round(config.cut * gait.trunk.n_sensed)
     chosen = stream(config.seed, "pruning_order").permutation(gait.trunk.n_sensed)[:count]
     names = [f"s{spring}" for spring in sorted(chosen.tolist())]
     assert gait.learned is not None
-    robot = new_robot(gait.trunk)
+    robot, walking = new_robot(gait.trunk), gait.robot()
     robot.alter(cut=names)
     robot.set_readout(gait.learned.w_out)
-    stand(robot)
+    robot.set_state(walking.qpos, walking.qvel)
     before = _short(config, gait, robot)
     robot = new_robot(gait.trunk)
     robot.alter(cut=names)

@@ -21,7 +21,7 @@ from mcmj.robots.steering import (
 )
 from mcmj.robots.trunk import Trunk, draw_trunk, muscle_target
 from mcmj.robots.trunk_walker import has_fallen, new_robot, poses, stand
-from mcmj.robots.walk_metrics import Walk, headings
+from mcmj.robots.walk_metrics import Walk, fallen, headings
 from mcmj.simulation.reservoir import Reservoir
 from mcmj.utils.errors import DivergenceError
 from mcmj.utils.progress import OnSteps
@@ -34,16 +34,24 @@ LONGEST = 300.0  # s, on a path
 
 @dataclass(frozen=True)
 class Path:
-    """A walk through points (n, 2), and the inputs (m,) that led it there."""
+    """A walk by points (n, 2), and the inputs (m,) that led it there.
+
+    Attributes:
+        apart: (n,) least distance from each point, between the one before and the one after
+            [m]; infinite for a point that was not come by.
+        fell: whether the robot fell on its way.
+    """
 
     points: Array
     walk: Walk
     inputs: Array
+    apart: Array
+    fell: bool
 
 
 @dataclass(frozen=True)
 class SteeredRobot:
-    """What has been learned, and how it followed a path; None: it fell, or there was none."""
+    """What has been learned, and how it followed a path; None: not learned, not followed."""
 
     trunk: Trunk
     steer: str
@@ -132,22 +140,34 @@ def figure_of_eight(radius: float, points: int = 16) -> Array:
 
 def follow(config: Config, found: SteeredRobot, straight: float) -> Path:
     """Through the points of a figure of eight, which begins where and as the robot walks."""
-    robot, (radius, near) = found.robot(), config.points
+    robot, (radius, near) = found.robot(), config.eight
     pose = poses(found.trunk, robot.qpos)
     heading = headings(pose[None])[0]
     turned = np.array([[np.cos(heading), np.sin(heading)], [-np.sin(heading), np.cos(heading)]])
     points = pose[:2] + figure_of_eight(radius) @ turned
     operator = PointFollower(points, config.gain, near, straight)
-    return Path(points, *operate(robot, found.trunk, LONGEST, operator, lambda: operator.done))
+    walk, inputs = operate(robot, found.trunk, LONGEST, operator, lambda: operator.done)
+    fell = bool(fallen(walk.trunk[0], found.trunk.settings.leg).any())
+    return Path(points, walk, inputs, distances_in_order(walk, operator), fell)
+
+
+def distances_in_order(walk: Walk, operator: PointFollower) -> Array:
+    """Least distance (n,) [m] from each point of an operator who has led a walk."""
+    apart = np.full(len(operator.points), np.inf)
+    moments = np.array([0, *operator.calls, np.inf]) * TELL  # when the one before was passed
+    times = walk.times - walk.times[0]
+    for k, point in enumerate(operator.points[: len(operator.calls)]):
+        there = (times >= moments[k]) & (times <= moments[k + 2])
+        apart[k] = np.linalg.norm(walk.trunk[0, there, :2] - point, axis=-1).min()
+    return apart
 
 
 def _path_table(config: Config, path: Path) -> Table:
     """How near to its points the robot came, at worst."""
-    middle = path.walk.trunk[0, :, :2]
-    apart = np.linalg.norm(middle[:, None] - path.points, axis=-1).min(axis=0)
     return {
-        "path_error_m": float(apart.max()),
-        "points_passed": int((apart < config.points[1]).sum()),
+        "path_error_m": float(path.apart.max()),
+        "points_passed": int((path.apart < config.eight[1]).sum()),
         "points": len(path.points),
         "path_duration_s": TELL * len(path.inputs),
+        "path_falls": int(path.fell),
     }
