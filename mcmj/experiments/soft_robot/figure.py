@@ -96,6 +96,8 @@ def _draw_path(axes: Axes, path: Path) -> None:
     axes.plot(*path.points.T, "o", color=TARGET_COLOUR, ms=5, label="points")
     axes.plot(*middle[0], ">", color="black", ms=7, label="start")
     axes.set(aspect="equal", xlabel="x [m]", ylabel="y [m], left")
-    axes.set_title(f"a figure of eight: off by {path.apart.max():.2f} m at most", fontsize=10)
+    off = path.apart.max()
+    told = f"off by {off:.2f} m at most" if off < float("inf") else "not finished"
+    axes.set_title(f"a figure of eight: {told}", fontsize=10)
     axes.legend(frameon=False, fontsize=8)
     axes.spines[["right", "top"]].set_visible(False)
