@@ -46,11 +46,17 @@ _BLOCK = re.compile(
 
 class Numbers(Formatter):
     """Formats of templates: `.3` digits as Python's, `p2` percent and `n2` a number, both with so
-    many significant digits, `name` a name in words. Of a list it is the median; what is not finite
-    is a dash."""
+    many significant digits, `name` a name in words. Of a list it is the median; what is not finite,
+    or beyond the end of a list, is a dash."""
 
     def get_value(self, key: int | str, args: Any, kwargs: Any) -> Any:
         return kwargs[str(key)]
+
+    def get_field(self, field_name: str, args: Any, kwargs: Any) -> Any:
+        try:
+            return super().get_field(field_name, args, kwargs)
+        except IndexError:  # a list that ends before: of a robot that fell
+            return None, field_name
 
     def format_field(self, value: Any, format_spec: str) -> str:
         if isinstance(value, list):
