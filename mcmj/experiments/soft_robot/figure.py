@@ -55,9 +55,10 @@ def draw_robot(figure: Figure, place: object, result: Result) -> Axes:
 def _place(axes: Any, trunk: Trunk) -> None:
     low, high = trunk.body.positions.min(axis=0), trunk.body.positions.max(axis=0)
     axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]))
-    axes.set_box_aspect(high - low, zoom=1.25)
+    axes.set_box_aspect(high - low, zoom=1.15)
     axes.view_init(elev=18, azim=-62)
-    axes.set(xlabel="x [m], forwards", ylabel="y [m], left", zlabel="height [m]")
+    axes.set(xlabel="x [m], forwards", zlabel="height [m]")
+    axes.set_ylabel("y [m]", labelpad=-4.0)
     axes.set_yticks([-0.2, 0.2])
     axes.set_zticks([0.0, 0.4, 0.8])
 
@@ -99,5 +100,5 @@ def _draw_path(axes: Axes, path: Path) -> None:
     off = path.apart.max()
     told = f"off by {off:.2f} m at most" if off < float("inf") else "not finished"
     axes.set_title(f"a figure of eight: {told}", fontsize=10)
-    axes.legend(frameon=False, fontsize=8)
+    axes.legend(frameon=False, fontsize=8, loc="center left", bbox_to_anchor=(1.0, 0.5))
     axes.spines[["right", "top"]].set_visible(False)
