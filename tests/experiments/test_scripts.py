@@ -105,7 +105,11 @@ def test_an_interrupt_leaves_nothing_half_written(tmp_path):
         "--out", tmp_path,
         preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),  # in a background shell
     )  # fmt: skip
-    time.sleep(6)
+    end = time.monotonic() + 60
+    while not list(tmp_path.glob(".checkpoint-*")):  # at work, no longer importing
+        assert process.poll() is None, process.stderr.read()
+        assert time.monotonic() < end
+        time.sleep(0.1)
     process.send_signal(signal.SIGINT)
     _, err = process.communicate(timeout=60)
     assert process.returncode not in (0, None)
