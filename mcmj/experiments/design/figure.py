@@ -4,6 +4,7 @@ from collections.abc import Mapping
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.axis import Axis
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import LogLocator, NullFormatter
@@ -62,9 +63,7 @@ def _draw_tried(axes: Axes, designs: Designs) -> None:
         ends = [*ended, most], [*share, len(ended) / len(numbers)]
         axes.step(*ends, where="post", color=COLOURS[kind], label=KINDS[kind])
     axes.set(xscale="log", xlabel="bodies tried", ylabel="share that passed", ylim=(0, 1.02))
-    axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-    axes.xaxis.set_major_formatter("{x:g}")
-    axes.xaxis.set_minor_formatter(NullFormatter())
+    _name_ticks(axes.xaxis)
     axes.set_title("until one passes its checks")
     axes.legend(frameon=False)
     axes.grid(alpha=0.3)
@@ -125,6 +124,8 @@ def pareto_figure(result: Result, fronts: Fronts) -> Figure:
             points = np.array(body[kind])
             axes.plot(*points.T, mark + "-", ms=4, lw=1, color=COLOURS[kind], alpha=0.7)
     axes.set(xscale="log", yscale="log", xlabel="orbit error without noise")
+    _name_ticks(axes.xaxis)
+    _name_ticks(axes.yaxis)
     axes.set_ylabel(f"with noise of {result.config.sensor_noise:g} m on all lengths")
     for line in (axes.axhline, axes.axvline):
         line(fronts.threshold, color=TARGET_COLOUR, ls="--", lw=1)
@@ -140,6 +141,13 @@ def pareto_figure(result: Result, fronts: Fronts) -> Figure:
     axes.set_title(f"{_title(result)}: a front for each of {len(fronts.bodies)} bodies")
     axes.grid(alpha=0.3)
     return figure
+
+
+def _name_ticks(axis: Axis) -> None:
+    """Of a logarithmic axis: 1, 2, 5, 10, .."""
+    axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    axis.set_major_formatter("{x:g}")
+    axis.set_minor_formatter(NullFormatter())
 
 
 def _title(result: Result) -> str:
