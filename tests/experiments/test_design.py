@@ -155,21 +155,27 @@ def test_bad_configs():
         Config(parts=("smallest",), sizes=())
 
 
-@pytest.mark.parametrize(("nodes", "most"), [(3, 0.05), (10, 0.01)])
-def test_the_designed_bodies_that_come_along_run_from_rest_and_learn_anew(nodes, most):
-    stored = open_body(f"designed_van_der_pol_{nodes}")
+@pytest.mark.parametrize(
+    ("task", "nodes", "most"),
+    [
+        ("van_der_pol", 3, 0.05),
+        ("van_der_pol", 10, 0.01),
+        ("quadratic", 3, 0.05),
+        ("lissajous", 8, 0.05),
+    ],
+)
+def test_the_designed_bodies_that_come_along_run_from_rest_and_learn_anew(task, nodes, most):
+    stored, goal = open_body(f"designed_{task}_{nodes}"), mcmj.target(task)
     assert stored.body.n_nodes == nodes
-    assert (
-        stored.body.springs
-        == mcmj.random_body(stored.provenance["body"]["seed"], nodes=nodes).springs
-    ).all()
+    drawn = mcmj.random_body(stored.provenance["body"]["seed"], nodes=nodes)
+    assert (stored.body.springs == drawn.springs).all()
     sim = mcmj.Simulation(stored.body, engine="twin", w_out=stored.w_out)
     for seed in (None, 5):  # the file's readout, then one of another noise
         if seed is not None:
-            mcmj.teach(sim, GOAL, Teaching(), seed=seed)
+            mcmj.teach(sim, goal, Teaching(), seed=seed)
         sim.reset()
-        sim.rollout(60_000, record=())
-        assert orbit_error(sim.rollout(20_000).outputs, GOAL) < most
+        sim.rollout(80_000, record=())
+        assert orbit_error(sim.rollout(20_000).outputs, goal) < most
 
 
 @pytest.mark.slow

@@ -55,10 +55,10 @@ def draw_robot(figure: Figure, place: object, result: Result) -> Axes:
 def _place(axes: Any, trunk: Trunk) -> None:
     low, high = trunk.body.positions.min(axis=0), trunk.body.positions.max(axis=0)
     axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]))
-    axes.set_box_aspect(high - low, zoom=1.15)
+    axes.set_box_aspect(high - low, zoom=1.1)
     axes.view_init(elev=18, azim=-62)
     axes.set(xlabel="x [m], forwards", zlabel="height [m]")
-    axes.set_ylabel("y [m]", labelpad=-4.0)
+    axes.set_ylabel("y [m]", labelpad=1.0)
     axes.set_yticks([-0.2, 0.2])
     axes.set_zticks([0.0, 0.4, 0.8])
 
