@@ -27,7 +27,7 @@ def test_limit_cycles_gaits_and_driven_rhythms_are_tasks():
     assert {("quadratic", "quadratic"), ("gaits", "bound"), ("input_driven", "eps=0.2")} <= set(
         TASKS
     )
-    assert len(TASKS) == 3 + 4 + 3 + 2  # a designed body has one
+    assert len(TASKS) == 3 + 4 + 3 + 4  # a designed body has one
 
 
 @every_task

@@ -61,8 +61,8 @@ def start(code, place, *prefix, home=None, **environment):
     ours = ("NUMBA_CACHE_DIR", "XDG_CACHE_HOME", "MCMJ_CACHE_DIR")
     inherited = {name: value for name, value in os.environ.items() if name not in ours}
     home = {"PYTHONPATH": str(place), "HOME": str(home or place)}
-    return subprocess.Popen(
-        [*prefix, sys.executable, "-c", code], cwd="/", env=inherited | home | environment,
+    return subprocess.Popen(  # -B: Python's own cache takes edits within a second for the same file
+        [*prefix, sys.executable, "-B", "-c", code], cwd="/", env=inherited | home | environment,
         stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
     )  # fmt: skip
 
