@@ -195,13 +195,13 @@ def main(
     run: Annotated[tuple[str, ...], tyro.conf.arg(metavar="PAGE")] = (), check: bool = False
 ) -> None:
     """Run the commands of these pages (`all` for every page), and fill all tables."""
-    pages = {path.stem: path for path in sorted(DOCS.rglob("*.md"))}
-    wanted = [name for name, path in pages.items() if name in run or "all" in run]
-    for name in wanted:
-        for one in runs_of(pages[name].read_text(encoding="utf-8")):
-            one.carry_out()
+    pages = sorted(DOCS.rglob("*.md"))
+    for page in pages:
+        if page.stem in run or "all" in run:
+            for one in runs_of(page.read_text(encoding="utf-8")):
+                one.carry_out()
     stale = []
-    for path in [ROOT / "README.md", *pages.values()]:
+    for path in [ROOT / "README.md", *pages]:
         text = path.read_text(encoding="utf-8")
         new = filled(text)
         if new != text:
