@@ -94,9 +94,8 @@ class Worth:
     @property
     def measures(self) -> dict[str, float]:
         """By the names of MEASURES; the memory capacity starts at delay 1 (Jaeger 2002)."""
-        linear = self.capacities.of_degree(1)
         return {
-            "memory_capacity": linear - self.capacities.of(((0, 1),)),
+            "memory_capacity": self.capacities.memory,
             "ipc_total": self.capacities.total,
             "kernel_rank": self.kernel_rank,
             "generalisation_rank": self.generalisation_rank,

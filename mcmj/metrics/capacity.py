@@ -48,6 +48,11 @@ class Capacities:
         """Sum of all capacities."""
         return float(self.values.sum())
 
+    @property
+    def memory(self) -> float:
+        """Linear memory of the inputs before the last one (Jaeger 2002)."""
+        return self.of_degree(1) - self.of(((0, 1),))
+
     def of_degree(self, degree: int) -> float:
         """Sum of the capacities of one total degree; 1 is linear memory."""
         return float(self.by_delay(degree).sum())
@@ -73,7 +78,7 @@ def memory_capacity(states: Array, inputs: Array, max_delay: int) -> Capacities:
     """Linear memory: the capacities for u_(k-i), i = 0 .. max_delay.
 
         MC = sum_i cov(u_(k-i), y_k)^2 / (var u var y)   (Jaeger, GMD report 152, 2002, leaves
-                                                          out i = 0: `total - of(((0, 1),))`)
+                                                          out i = 0: `memory`)
 
     Args:
         states: (K, N).

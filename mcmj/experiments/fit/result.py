@@ -88,7 +88,7 @@ def _told(worth: Worth, config: Config) -> dict[str, object]:
     degrees = range(1, len(config.max_delays) + 1)
     return {
         "baseline_test_nrmse_std": worth.baseline,
-        "memory_capacity": capacities.of_degree(1) - capacities.of(((0, 1),)),
+        "memory_capacity": capacities.memory,
         "memory_by_delay": capacities.by_delay(1),
         "information_processing_capacity": capacities.total,
         "ipc_by_degree": {str(degree): capacities.of_degree(degree) for degree in degrees},

@@ -86,8 +86,9 @@ def capacity(config: Config, gait: LearnedGait) -> Table:
             table[what] = None
             continue
         found = processing_capacity(states[WASHOUT:], symbols[WASHOUT:, 0], MAX_DELAYS)
-        linear = found.of_degree(1) - found.of(((0, 1),))
-        table[what] = {"rank": found.rank, "memory_capacity": linear, "ipc_total": found.total}
+        table[what] = {
+            "rank": found.rank, "memory_capacity": found.memory, "ipc_total": found.total,
+        }  # fmt: skip
     return table
 
 

@@ -53,10 +53,11 @@ def economy(config: Config, gaits: dict[str, LearnedGait], name: str, on_steps: 
             best, least = candidates[int(np.argmin(scores))], min(scores)
     other = designed(config, name, best)
     seeds = range(config.seed, config.seed + ROBOTS)
+    others = [learn(config, (seed, name), on_steps) for seed in seeds[1:]]
     return {
         "tried": len(costs),
         "costs": costs,
-        "drawn": [walk_row(config, learn(config, (seed, name), on_steps)) for seed in seeds],
+        "drawn": [walk_row(config, gait) for gait in (gaits[name], *others)],
         "designed": [walk_row(other, learn(other, (seed, name), on_steps)) for seed in seeds],
         "settings": _numbers(other, name),
     }
